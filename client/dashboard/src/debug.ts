@@ -10,10 +10,7 @@ import { decodeMessage, type FrameMessage } from "./stream/protocol";
 import { coefficientsOf, summarised } from "./stream/summary";
 
 /** A density read back from the renderer that the page's own pictures are made with. */
-interface Reading {
-  readonly renderer: string;
-  readonly values: number[];
-}
+type Reading = Readonly<{ renderer: string; values: number[] }>;
 
 class Bench {
   #renderer: DensityRenderer | null = null;

@@ -31,7 +31,9 @@ class Page {
   readonly store = new Store({
     shelf: null,
     api: new Api(() =>
-      Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent, products: this.products, active: null, recordings: [] }))),
+      Promise.resolve(
+        new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent, products: this.products, active: null, recordings: [] })),
+      ),
     ),
   });
   readonly client = new StreamClient(

@@ -3,17 +3,9 @@ import type { ColourMapName } from "../scales/colourMaps";
 import type { Tone } from "../scales/tone";
 
 /** The still scene behind the light: one brightness a pixel, `white` shown brightest. */
-export interface Backdrop {
-  readonly values: Float32Array;
-  readonly white: number;
-}
+export type Backdrop = Readonly<{ values: Float32Array; white: number }>;
 
-export interface Exposure {
-  readonly phase_rad: number;
-  readonly tone: Tone;
-  readonly colours: ColourMapName;
-  readonly backdrop: Backdrop | null;
-}
+export type Exposure = Readonly<{ phase_rad: number; tone: Tone; colours: ColourMapName; backdrop: Backdrop | null }>;
 
 /**
  * Draws the density of Eq. (2) at one time of flight on a canvas of the sensor's size.

@@ -21,9 +21,7 @@ const UNIFORMS = [
 type Uniforms = Record<(typeof UNIFORMS)[number], WebGLUniformLocation | null>;
 
 /** Texture units, one a sampler. */
-const COEFFICIENTS = 0;
-const BACKDROP = 1;
-const COLOURS = 2;
+const [COEFFICIENTS, BACKDROP, COLOURS] = [0, 1, 2];
 
 /** Draws in a WebGL2 fragment shader; coefficients go to the graphics memory once a frame. */
 export class WebGl2Renderer implements DensityRenderer {
@@ -41,13 +39,7 @@ export class WebGl2Renderer implements DensityRenderer {
 
   /** A renderer on `canvas`, or null where the browser refuses WebGL2. */
   static create(canvas: HTMLCanvasElement): WebGl2Renderer | null {
-    const gl = canvas.getContext("webgl2", {
-      alpha: false,
-      antialias: false,
-      depth: false,
-      stencil: false,
-      powerPreference: "low-power",
-    });
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, stencil: false, powerPreference: "low-power" });
     return gl === null ? null : new WebGl2Renderer(canvas, gl);
   }
 

@@ -65,10 +65,7 @@ export function peaks(c: Coefficients, pixel: number): Peak[] {
 const SPREAD = 1.5;
 
 /** A pixel and the peaks of it that are sampled more closely. */
-export interface Peaked {
-  readonly pixel: number;
-  readonly peaks: readonly Peak[];
-}
+export type Peaked = Readonly<{ pixel: number; peaks: readonly Peak[] }>;
 
 /** `count` even phases over one turn, rising, and more around each pixel's peaks. */
 export function phasesAround(c: Coefficients, count: number, around: readonly Peaked[]): Float64Array {

@@ -8,13 +8,7 @@
  */
 
 /** One frame of coefficients: `planes` holds 2 m + 1 images of `width` x `height`, row by row. */
-export interface Coefficients {
-  readonly planes: Float32Array;
-  readonly harmonics: number;
-  readonly width: number;
-  readonly height: number;
-  readonly baseFrequency_hz: number;
-}
+export type Coefficients = Readonly<{ planes: Float32Array; harmonics: number; width: number; height: number; baseFrequency_hz: number }>;
 
 /** |sum_j conj(a_j) z^j|^2 of one pixel by Horner's rule, z = exp(i phi) = (re, im). */
 function squaredModulus(c: Coefficients, pixel: number, re: number, im: number): number {

@@ -42,14 +42,11 @@ function leastDirection([xx, yy, zz]: Vector, [xy, yz, xz]: Vector): Vector | nu
   const angle = Math.acos(Math.min(1, Math.max(-1, determinant / (2 * p ** 3)))) / 3;
   const least = mean + 2 * p * Math.cos(angle + (2 * Math.PI) / 3);
   // Every row of the matrix less the eigenvalue is perpendicular to the eigenvector.
-  const rows: readonly Vector[] = [
-    [xx - least, xy, xz],
-    [xy, yy - least, yz],
-    [xz, yz, zz - least],
-  ];
-  const found = [cross(rows[0], rows[1]), cross(rows[1], rows[2]), cross(rows[2], rows[0])].sort(
-    (a, b) => Math.hypot(...b) - Math.hypot(...a),
-  )[0];
+  const first: Vector = [xx - least, xy, xz];
+  const second: Vector = [xy, yy - least, yz];
+  const third: Vector = [xz, yz, zz - least];
+  const normals = [cross(first, second), cross(second, third), cross(third, first)];
+  const [found] = normals.sort((a, b) => Math.hypot(...b) - Math.hypot(...a));
   const length = Math.hypot(...found);
   if (!(length > FLAT * (mean + 2 * p) ** 2)) return null;
   return [found[0] / length, found[1] / length, found[2] / length];

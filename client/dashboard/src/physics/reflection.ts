@@ -61,11 +61,7 @@ export function pixelOf(c: Coefficients, pixel: number): Pixel | null {
 }
 
 /** The least and the greatest smoothed density that moments allow, and that of the estimate. */
-export interface Bounds {
-  readonly lower: number;
-  readonly upper: number;
-  readonly smoothed: number;
-}
+export type Bounds = Readonly<{ lower: number; upper: number; smoothed: number }>;
 
 /**
  * Sharp bounds at `phase_rad` (Sec. 5.2, after Karlsson and Georgiou 2013), in units of b_0 per radian.

@@ -3,15 +3,7 @@
 export const NOTHING = "–";
 const THIN_SPACE = "\u202f";
 
-const PREFIXES: readonly (readonly [number, string])[] = [
-  [1e9, "G"],
-  [1e6, "M"],
-  [1e3, "k"],
-  [1, ""],
-  [1e-3, "m"],
-  [1e-6, "µ"],
-  [1e-9, "n"],
-];
+const PREFIXES = Object.entries({ G: 1e9, M: 1e6, k: 1e3, "": 1, m: 1e-3, µ: 1e-6, n: 1e-9 });
 
 export function withUnit(text: string, unit: string): string {
   return unit === "" || unit === "1" ? text : `${text}${THIN_SPACE}${unit}`;
@@ -28,7 +20,7 @@ export function engineering(value: number | null | undefined, unit: string, digi
   if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
   if (value === 0) return withUnit("0", unit);
   const size = Math.abs(value);
-  const [factor, prefix] = PREFIXES.find(([f]) => size >= f * 0.9995) ?? PREFIXES[PREFIXES.length - 1];
+  const [prefix, factor] = PREFIXES.find(([, f]) => size >= f * 0.9995) ?? PREFIXES[PREFIXES.length - 1];
   // Rounding first: 999.9999 has as many digits before the point as 1000.
   const scaled = Number((value / factor).toPrecision(digits));
   const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(scaled)) + 1e-9));

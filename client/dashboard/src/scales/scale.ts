@@ -2,11 +2,7 @@
 
 export type ScaleKind = "linear" | "root" | "logarithmic";
 
-export interface Scale {
-  readonly low: number;
-  readonly high: number;
-  readonly kind: ScaleKind;
-}
+export type Scale = Readonly<{ low: number; high: number; kind: ScaleKind }>;
 
 /** A logarithmic scale never reaches further down than this share of its high end. */
 const SMALLEST_SHARE = 1e-4;
@@ -81,10 +77,7 @@ export function decimalsFor(step: number): number {
 }
 
 /** What a frame's values span: the 2nd and 98th percentile of those that are numbers. */
-export interface Span {
-  readonly low: number;
-  readonly high: number;
-}
+export type Span = Readonly<{ low: number; high: number }>;
 
 /** The span around zero that holds a span. */
 export function symmetric({ low, high }: Span): Span {
@@ -115,14 +108,8 @@ export function histogram(values: ArrayLike<number>, scale: Scale, bins: number,
  */
 export function autoLimits(previous: Span | null, span: Span): Span {
   if (!(span.high >= span.low)) return previous ?? { low: 0, high: 1 };
-  if (
-    previous !== null &&
-    span.low >= previous.low &&
-    span.high <= previous.high &&
-    span.high - span.low > 0.5 * (previous.high - previous.low)
-  ) {
-    return previous;
-  }
+  const within = previous !== null && span.low >= previous.low && span.high <= previous.high;
+  if (within && span.high - span.low > 0.5 * (previous.high - previous.low)) return previous;
   const width = span.high - span.low || Math.abs(span.high) || 1;
   const step = niceStep(width, 6);
   // Half a step of room on either side, so that noise at the ends does not move them.

@@ -1,7 +1,7 @@
 /** The REST side of the service: requests, and problems in plain words. */
 
-import type { Answers, AppliedDocument, Bodies, ReconstructionDocument } from "../stream/documents";
-import type { Problem, SequenceRequest } from "../stream/protocol";
+import type { Answers, Bodies, ReconstructionDocument } from "../stream/documents";
+import { type Problem, problemOf } from "../stream/protocol";
 import { Credentials } from "./credentials";
 
 /** The service refused a request (RFC 9457), or could not be asked at all. */
@@ -56,10 +56,7 @@ interface RequestDetails<Body = unknown> {
 }
 
 /** What was read, and the tag of its version, to change just this one. */
-export interface Tagged<T> {
-  readonly document: T;
-  readonly tag: string | null;
-}
+export type Tagged<T> = Readonly<{ document: T; tag: string | null }>;
 
 /** Where the newest frame of the camera is; frames of recordings are elsewhere. */
 export const LIVE = "/frames/latest";
@@ -92,10 +89,6 @@ export class Api {
     return (await this.#answer(method, details.at ?? filled, details)).json() as Promise<Answers[Name]>;
   }
 
-  validate(sequence: SequenceRequest, signal: AbortSignal): Promise<AppliedDocument> {
-    return this.ask("POST /sequence/validate", { body: sequence, signal });
-  }
-
   /** The number of the newest frame; null before the first. */
   async newestFrame(): Promise<number | null> {
     return (await this.ask("GET /frames")).last;
@@ -122,8 +115,11 @@ export class Api {
 
   async #answer(method: string, path: string, details: RequestDetails = {}): Promise<Response> {
     const answer = await this.#ask(method, path, details);
-    await this.#refuse(answer);
-    return answer;
+    if (answer.ok) return answer;
+    const problem = await problemOf(answer);
+    if (answer.status === 401) this.credentials.refused.value = problem;
+    this.onRefusal?.(problem);
+    throw new RequestError(problem);
   }
 
   async #ask(method: string, path: string, { body, signal, keepalive, headers }: RequestDetails): Promise<Response> {
@@ -145,24 +141,6 @@ export class Api {
       throw new RequestError({ title: "The service cannot be reached." });
     }
   }
-
-  /** Raises what the service answered unless it is a success. */
-  async #refuse(answer: Response): Promise<void> {
-    if (answer.ok) return;
-    let problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
-    try {
-      problem = { ...problem, ...((await answer.json()) as Problem) };
-    } catch {
-      // A proxy's page instead of a problem: the status has to do.
-    }
-    if (answer.status === 401) this.credentials.refused.value = problem;
-    this.onRefusal?.(problem);
-    throw new RequestError(problem);
-  }
-}
-
-export function calibrationPath(id: string): string {
-  return `/calibrations/${encodeURIComponent(id)}`;
 }
 
 export function recordingPath(id: string): string {

@@ -42,7 +42,7 @@ export class StreamClient {
     private readonly loop: AnimationLoop,
     private readonly now_s: Clock = () => Date.now() / 1000,
   ) {
-    worker.onmessage = ({ data }) => this.#receive(data);
+    worker.onmessage = ({ data }) => (this.#received[data.type] as (report: Report) => void)(data);
     loop.add(() => {
       this.#draw();
       for (const take of this.#brought.splice(0)) take();
@@ -101,47 +101,32 @@ export class StreamClient {
     this.worker.postMessage(command);
   }
 
-  #receive(report: Report): void {
-    const { status } = this.store;
-    switch (report.type) {
-      case "connecting":
-        status.connection.value = { kind: "connecting" };
-        break;
-      case "open":
-        status.connection.value = { kind: "open" };
-        break;
-      case "refused":
-        status.connection.value = { kind: "refused" };
-        this.store.caller.forget();
-        this.store.asksForToken.value = true;
-        break;
-      case "waiting":
-        status.connectionLost(report.reason, this.now_s() + report.retry_s);
-        break;
-      case "camera":
-        this.#takeCamera(report.document);
-        break;
-      case "demand":
-        status.demanded.value = report.carried_bytes_s === null && report.pictures_hz === null ? null : report;
-        this.#fluency.restart();
-        break;
-      case "unreadable":
-        status.unreadable.value = report.reason;
-        break;
-      case "frame":
-        this.#pending.set(report.message.product, report);
-        this.loop.wake();
-        break;
-      case "brought":
-        this.#deliver(report.ticket, report.reports, report.problem);
-        break;
-      case "message":
-        if (report.message.type === "hello") this.#greet(report.message);
-        else if (report.message.type === "notice") this.#notice(report.message);
-        else if (report.message.type === "error") this.#complain(report.message);
-        break;
-    }
-  }
+  readonly #received: { readonly [Type in Report["type"]]: (report: Extract<Report, { type: Type }>) => void } = {
+    connecting: () => (this.store.status.connection.value = { kind: "connecting" }),
+    open: () => (this.store.status.connection.value = { kind: "open" }),
+    refused: () => {
+      this.store.status.connection.value = { kind: "refused" };
+      this.store.caller.forget();
+      this.store.asksForToken.value = true;
+    },
+    waiting: ({ reason, retry_s }) => this.store.status.connectionLost(reason, this.now_s() + retry_s),
+    camera: ({ document }) => this.#takeCamera(document),
+    demand: (report) => {
+      this.store.status.demanded.value = report.carried_bytes_s === null && report.pictures_hz === null ? null : report;
+      this.#fluency.restart();
+    },
+    unreadable: ({ reason }) => (this.store.status.unreadable.value = reason),
+    frame: (report) => {
+      this.#pending.set(report.message.product, report);
+      this.loop.wake();
+    },
+    brought: ({ ticket, reports, problem }) => this.#deliver(ticket, reports, problem),
+    message: ({ message }) => {
+      if (message.type === "hello") this.#greet(message);
+      else if (message.type === "notice") this.#notice(message);
+      else if (message.type === "error") this.#complain(message);
+    },
+  };
 
   #greet(hello: Hello): void {
     const { status } = this.store;
@@ -356,10 +341,7 @@ function sameSequence(one: AppliedDocument, other: AppliedDocument | null): bool
   return other !== null && JSON.stringify({ ...one, sequence_id: 0 }) === JSON.stringify({ ...other, sequence_id: 0 });
 }
 
-interface Errand {
-  readonly resolve: (reports: readonly FrameReport[]) => void;
-  readonly reject: (error: Error) => void;
-}
+type Errand = Readonly<{ resolve: (reports: readonly FrameReport[]) => void; reject: (error: Error) => void }>;
 
 /** How long the picture stays where it is before only the part in sight is asked for. */
 const SETTLED_S = 0.3;

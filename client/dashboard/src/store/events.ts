@@ -8,10 +8,7 @@ import { refusalIn } from "./api";
 export type EventTone = "plain" | "good" | "bad";
 
 /** What can be done about what happened. */
-interface Remedy {
-  readonly word: string;
-  readonly run: () => void;
-}
+type Remedy = Readonly<{ word: string; run: () => void }>;
 
 export interface Happening {
   /** Counts the happenings of this page. */
@@ -109,10 +106,7 @@ export function inWords(notice: Notice): Sentence | null {
   return (WORDS[notice.kind] as ((notice: Notice) => Sentence) | undefined)?.(notice) ?? null;
 }
 
-interface Sentence {
-  readonly words: string;
-  readonly tone: EventTone;
-}
+type Sentence = Readonly<{ words: string; tone: EventTone }>;
 
 const plain = (words: string): Sentence => ({ words, tone: "plain" });
 const good = (words: string): Sentence => ({ words, tone: "good" });
@@ -165,14 +159,8 @@ export function sequenceKey({ sequence_id }: AppliedDocument): string {
 }
 
 function leaseWords({ change, holder, from }: Extract<Notice, { kind: "lease-changed" }>): string {
-  switch (change) {
-    case "taken-over":
-      return `${holder} has taken over control from ${from}.`;
-    case "granted":
-      return `${holder} has taken control.`;
-    case "lapsed":
-      return "Control has lapsed: its holder did not renew it.";
-    default:
-      return "Control was given back: every client may change things.";
-  }
+  if (change === "taken-over") return `${holder} has taken over control from ${from}.`;
+  if (change === "granted") return `${holder} has taken control.`;
+  if (change === "lapsed") return "Control has lapsed: its holder did not renew it.";
+  return "Control was given back: every client may change things.";
 }

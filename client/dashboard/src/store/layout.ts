@@ -127,14 +127,7 @@ export function closed(layout: Layout, view: string): Layout {
 export function beside(layout: Layout, view: string, wanted: string): Layout | null {
   const home = layout.find(({ slots }) => slots.some((place) => holds(place, view)));
   if (home === undefined || home.slots.length >= MOST_SLOTS) return null;
-  return mapped(layout, (place) =>
-    holds(place, view)
-      ? [
-          { ...place, share: place.share / 2 },
-          { view: wanted, share: place.share / 2 },
-        ]
-      : [place],
-  );
+  return mapped(layout, (place) => (holds(place, view) ? halved(place, wanted) : [place]));
 }
 
 /** `wanted` below `view`: in a row of its own where `view` has one, else in half of its height; null where there is no room. */
@@ -145,14 +138,17 @@ export function below(layout: Layout, view: string, wanted: string): Layout | nu
   if (home.slots.length === 1 && !isStack(place))
     return layout.length >= MOST_ROWS ? null : layout.flatMap((each) => (each === home ? withRowBelow(each, wanted) : [each]));
   if (slotsOf(place).length >= MOST_SLOTS) return null;
-  const halved = (slot: Slot): Slot[] =>
-    slot.view === view
-      ? [
-          { ...slot, share: slot.share / 2 },
-          { view: wanted, share: slot.share / 2 },
-        ]
-      : [slot];
-  return mapped(layout, (each) => (each === place ? [{ share: place.share, slots: slotsOf(place).flatMap(halved) }] : [each]));
+  const slots = slotsOf(place).flatMap((slot) => (slot.view === view ? halved(slot, wanted) : [slot]));
+  return mapped(layout, (each) => (each === place ? [{ share: place.share, slots }] : [each]));
+}
+
+/** A place in half of its room, and a view in the other half. */
+function halved<Part extends Slot | Stack>(place: Part, view: string): (Part | Slot)[] {
+  const share = place.share / 2;
+  return [
+    { ...place, share },
+    { view, share },
+  ];
 }
 
 function withRowBelow(above: Row, wanted: string): Row[] {

@@ -128,13 +128,8 @@ export class Lease {
     } else if (!held && this.control.peek().kind === "other") {
       this.lost.value = null; // the client that took control gave it back
     }
-    if (!held) this.control.value = { kind: "free" };
-    else
-      this.control.value = {
-        kind: this.api.credentials.leaseId.peek() === null ? "other" : "us",
-        holder: holder ?? "Another client",
-        expires_s,
-      };
+    const kind = this.api.credentials.leaseId.peek() === null ? "other" : "us";
+    this.control.value = held ? { kind, holder: holder ?? "Another client", expires_s } : { kind: "free" };
   }
 
   #arm(control: Control, within_s = Infinity): void {

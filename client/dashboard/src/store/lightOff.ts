@@ -46,10 +46,8 @@ export class LightOff {
       if (press === this.#press) this.done(state);
     } catch (error) {
       const refused = error instanceof RequestError && [401, 403].includes(error.problem.status ?? 0);
-      next = {
-        kind: refused ? "refused" : "unconfirmed",
-        reason: error instanceof RequestError ? error.message : "The service does not answer.",
-      };
+      const reason = error instanceof RequestError ? error.message : "The service does not answer.";
+      next = { kind: refused ? "refused" : "unconfirmed", reason };
     }
     if (press !== this.#press) return;
     this.state.value = next;

@@ -30,11 +30,7 @@ export class Look {
   ) {
     const key = (what: string): string => `map.${product.product}.${what}`;
     const colours: Setting<ColourMapName> = { key: key("colours"), initial: product.colours, ...oneOf(COLOUR_MAPS) };
-    const kind: Setting<ScaleKind> = {
-      key: key("scale"),
-      initial: product.scale ?? "linear",
-      ...oneOf<ScaleKind>(["linear", "logarithmic"]),
-    };
+    const kind: Setting<ScaleKind> = { key: key("scale"), initial: product.scale ?? "linear", ...oneOf(["linear", "logarithmic"]) };
     const manual: Setting<Span | null> = { key: key("limits"), initial: null, ...LIMITS };
     settings.together("look", [colours, kind, manual], { of: product.product });
     [this.colours, this.kind, this.manual] = [settings.of(colours), settings.of(kind), settings.of(manual)];

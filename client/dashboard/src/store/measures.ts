@@ -12,9 +12,7 @@ export const PIN_COLOURS: Readonly<Record<PinName, string>> = { A: "#e69f00", B:
 export type PinName = (typeof PIN_NAMES)[number];
 
 /** A pixel that is kept. */
-export interface Pin extends Pixel {
-  readonly name: PinName;
-}
+export type Pin = Pixel & Readonly<{ name: PinName }>;
 
 /** A rectangle of pixels, both corners included; `x0` and `y0` are not larger than `x1` and `y1`. */
 export interface Region {

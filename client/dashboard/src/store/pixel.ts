@@ -1,8 +1,5 @@
 /** A place on the sensor: column from the left, row from the top. */
-export interface Pixel {
-  readonly x: number;
-  readonly y: number;
-}
+export type Pixel = Readonly<{ x: number; y: number }>;
 
 /** As "81,20". */
 export function pixelText({ x, y }: Pixel): string {

@@ -7,10 +7,7 @@ export const SPEEDS_NS: readonly number[] = [0.5, 1, 2, 5, 10, 20];
 const NEAR = 1e-3;
 
 /** A part of the period, in shares of it. */
-export interface Lit {
-  readonly first: number;
-  readonly last: number;
-}
+export type Lit = Readonly<{ first: number; last: number }>;
 
 /** Which moment of the flight is looked at, and how it moves on. */
 export class Player {

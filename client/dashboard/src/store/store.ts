@@ -52,11 +52,8 @@ const A_MAP: Kind<string> = { accepts: isMap, text: String, parse: (text) => (is
 export class Store extends Ground {
   readonly frames = new Frames();
   readonly status = new Status();
-  /** Who this page is to the service. */
   readonly caller = new Caller(this.api);
-  /** Who controls the camera. */
   readonly lease = new Lease(this.api);
-  /** Switches the light off, whoever does. */
   readonly lightOff = new LightOff(this.api, (state) => this.status.cameraIs(state, Date.now() / 1000));
   /** Why nothing can be changed from here; null where everything may. */
   readonly obstacle = computed(() => this.caller.obstacle.value ?? this.lease.obstacle.value);
@@ -64,21 +61,15 @@ export class Store extends Ground {
   readonly reconstruction = new Reconstruction(this.api);
   readonly calibrations = new Calibrations(this.api);
   readonly simulation = new Simulation(this.api);
-  /** What accuracy costs in time. */
   readonly accuracy = new Accuracy(this.api);
-  /** Settings that are compared by captured frames. */
   readonly series = new Series(this.api, this.settings);
-  /** What only the service knows of the selected pixel. */
   readonly details = new Details(this.api);
-  /** A recording in the place of the camera. */
   readonly replay = new Replay(this.api, this.frames, this.status);
   /** The page keeps the frame it shows although newer ones exist. */
   readonly held = signal(false);
   /** How far the range is off. */
   readonly rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active, this.held);
-  /** How the flow of frames went. */
   readonly trends = new Trends(this.status, this.rangeErrors);
-  /** What happened. */
   readonly events = new Events();
   /** The sequence in use, by the service; null until it is known. */
   readonly sequence = signal<AppliedDocument | null>(null);
@@ -96,7 +87,6 @@ export class Store extends Ground {
     return 1 / (shown ?? this.sequence.value?.base_frequency_hz ?? 23e6);
   });
   readonly player = new Player(this.period_s);
-  /** How much pixels scatter from frame to frame. */
   readonly noises = new Noises(this.frames);
   /** The pixel under the pointer, in whichever view. */
   readonly pointed = signal<Pixel | null>(null);
@@ -138,19 +128,12 @@ export class Store extends Ground {
   });
   /** The one view that is shown alone; null while all are. */
   readonly alone = this.settings.of<string | null>({ link: "view", followed: true, initial: null, ...oneOf<string>(VIEW_NAMES) });
-  /** Where the views stand. */
   readonly layout: Signal<Layout> = this.settings.of(LAYOUT);
-  /** Layouts under names, and the way back from changes of it. */
   readonly layouts = new Layouts(this.settings, this.layout);
-  /** What the maps are compared with. */
   readonly comparison = new Comparison(this.frames, this.rangeErrors, this.settings);
-  /** How maps are shown. */
   readonly looks = new Looks(this.frames, this.settings, this.comparison);
-  /** How light in flight is shown. */
   readonly light = new TransientLook(this.frames.of("coefficients"), this.settings);
-  /** Pixels that are kept, and a region. */
   readonly measures = new Measures(this.settings);
-  /** Which part of the picture is shown. */
   readonly viewport = new Viewport(this.settings);
   /** That part in pixels: column and row of the first, width and height; null for the whole. */
   readonly sight = computed(() => sightOf(this.viewport.view.value, this.camera.value));
@@ -166,14 +149,11 @@ export class Store extends Ground {
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));
       if (problem.status !== 401) return;
-      api.credentials.refused.value = problem;
       this.caller.forget();
       this.asksForToken.value = true;
     };
     const absent = computed(() => this.camera.value?.capabilities.model === "none");
-    effect(() => {
-      this.asksForCamera.value = absent.value;
-    });
+    effect(() => void (this.asksForCamera.value = absent.value));
     effect(() => {
       const seesLight = this.frames.absent.value.coefficients === undefined;
       if (!seesLight && JSON.stringify(this.layout.peek()) === JSON.stringify(OVERVIEW)) this.layout.value = SPACE;

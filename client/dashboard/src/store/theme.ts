@@ -19,9 +19,7 @@ export class Theme {
 
   /** Shows itself on the page's root, where the style sheet looks for it. */
   show(root: HTMLElement): () => void {
-    return effect(() => {
-      root.dataset.theme = this.dark.value ? "dark" : "light";
-    });
+    return effect(() => void (root.dataset.theme = this.dark.value ? "dark" : "light"));
   }
 
   next(): void {

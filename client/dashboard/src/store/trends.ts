@@ -54,10 +54,7 @@ export class Trends {
 }
 
 /** A place in a plot, in shares of its width from the left and of its height from the foot. */
-export interface PlotPoint {
-  readonly x: number;
-  readonly y: number;
-}
+export type PlotPoint = Readonly<{ x: number; y: number }>;
 
 /** The lines of a figure over the last minute, the newest sample at the right; broken where it is not known. Its height is from zero to `most`. */
 export function linesOf(

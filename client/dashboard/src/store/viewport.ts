@@ -4,17 +4,10 @@ import type { Signal } from "@preact/signals";
 import type { Settings } from "./settings";
 
 /** A part of the picture: `zoom` times as large, its left and top end in shares of the whole. */
-export interface View {
-  readonly zoom: number;
-  readonly left: number;
-  readonly top: number;
-}
+export type View = Readonly<{ zoom: number; left: number; top: number }>;
 
 /** A place in the picture or in what is seen of it, in shares of its width and height. */
-export interface Point {
-  readonly x: number;
-  readonly y: number;
-}
+export type Point = Readonly<{ x: number; y: number }>;
 
 export const WHOLE: View = { zoom: 1, left: 0, top: 0 };
 const MOST_ZOOM = 40;

@@ -7,10 +7,7 @@
  */
 
 /** A product of a frame. */
-export interface Announcement {
-  readonly frame: number;
-  readonly product: string;
-}
+export type Announcement = Readonly<{ frame: number; product: string }>;
 
 export class Announced {
   #waiting: Announcement[] = [];

@@ -63,10 +63,7 @@ export function decodeReflection16(codes: Uint16Array, brightness: Float32Array)
 }
 
 /** Which pixels of a frame an array has: columns and rows of a region, every so many of them. */
-export interface Cut {
-  readonly region: readonly [x: number, y: number, width: number, height: number];
-  readonly decimation: number;
-}
+export type Cut = Readonly<{ region: readonly [x: number, y: number, width: number, height: number]; decimation: number }>;
 
 /** Whether an array that is cut so has this pixel. */
 export function has({ region: [x0, y0, columns, rows], decimation }: Cut, x: number, y: number): boolean {

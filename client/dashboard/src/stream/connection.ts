@@ -184,13 +184,8 @@ export class StreamConnection {
     this.#inFlight.clear(); // the service forgets them too
     this.#announced.clear();
     this.#control.restart();
-    this.#socket?.send(
-      encodeSubscribe(
-        products.map((product) => this.#subscriptionOf(product)),
-        CREDITS,
-        this.#token,
-      ),
-    );
+    const subscriptions = products.map((product) => this.#subscriptionOf(product));
+    this.#socket?.send(encodeSubscribe(subscriptions, CREDITS, this.#token));
   }
 
   #subscriptionOf(product: string): Subscription {

@@ -59,12 +59,7 @@ const MOST_PATIENCE = 16;
 type Bottleneck = "link" | "page";
 
 /** A step to less: what is asked for since, what was slow, and what was counted before. */
-interface Step {
-  readonly demand: Demand;
-  readonly slow: Bottleneck;
-  readonly before_hz: number;
-  readonly carried_bytes_s: number;
-}
+type Step = Readonly<{ demand: Demand; slow: Bottleneck; before_hz: number; carried_bytes_s: number }>;
 
 /** What came in a window: pictures are null where no light moved, `taken` is the share of the frames that were due. */
 interface Counted {
@@ -106,11 +101,7 @@ export class DemandControl {
 
   get decision(): Decision {
     const first = (slow: Bottleneck): Step | undefined => (this.#rests ? undefined : this.#steps.find((step) => step.slow === slow));
-    return {
-      demand: this.demand,
-      carried_bytes_s: first("link")?.carried_bytes_s ?? null,
-      pictures_hz: first("page")?.before_hz ?? null,
-    };
+    return { demand: this.demand, carried_bytes_s: first("link")?.carried_bytes_s ?? null, pictures_hz: first("page")?.before_hz ?? null };
   }
 
   /** Another session or sequence: what was measured does not hold any more. */

@@ -13,11 +13,7 @@ export const SUBPROTOCOL = "transientcam.v1.msgpack";
 export type Dtype = "<f4" | "<f8" | "<c8" | "<u2" | "|u1";
 
 /** An array in C order. Complex numbers ("<c8") lie as pairs of float32: real, imaginary. */
-export interface NdArray {
-  readonly dtype: Dtype;
-  readonly shape: readonly number[];
-  readonly data: Numbers;
-}
+export type NdArray = Readonly<{ dtype: Dtype; shape: readonly number[]; data: Numbers }>;
 
 /** What the camera is doing, in the service's words. */
 export type CameraState = CameraDocument["state"];
@@ -53,10 +49,7 @@ type SequenceChanged = Extract<StatedNotice, { kind: "sequence-changed" }>;
 /** An event; the sequence in it is the document that REST answers. */
 export type Notice = Exclude<StatedNotice, SequenceChanged> | (Omit<SequenceChanged, "sequence"> & { readonly sequence: AppliedDocument });
 
-export interface ErrorMessage {
-  readonly type: "error";
-  readonly problem: Problem;
-}
+export type ErrorMessage = Readonly<{ type: "error"; problem: Problem }>;
 
 /** RFC 9457, with the extensions of this service; what the page itself finds wrong has fewer fields. */
 export interface Problem extends Partial<ProblemDocument> {
@@ -64,12 +57,14 @@ export interface Problem extends Partial<ProblemDocument> {
   readonly takes?: readonly { readonly takes: number; readonly capture_s: number; readonly range_std_m: number }[];
 }
 
-/** A frame has this product: of its array one pixel came, and the rest is to be requested. */
-export interface AnnouncementMessage {
-  readonly type: "announcement";
-  readonly frame: number;
-  readonly product: string;
+/** Why the service refused; of a proxy's page in the place of a problem the status has to do. */
+export async function problemOf(answer: Response): Promise<Problem> {
+  const problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
+  return { ...problem, ...((await answer.json().catch(() => ({}))) as Problem) };
 }
+
+/** A frame has this product: of its array one pixel came, and the rest is to be requested. */
+export type AnnouncementMessage = Readonly<{ type: "announcement"; frame: number; product: string }>;
 
 export type ServerMessage = Hello | FrameMessage | AnnouncementMessage | Notice | ErrorMessage;
 

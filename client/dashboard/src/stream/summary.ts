@@ -73,13 +73,7 @@ function sampleOf(coefficients: Coefficients): Coefficients {
 export function coefficientsOf({ array, meta }: FrameMessage): Coefficients | null {
   const [layers, height, width] = array.shape;
   if (array.shape.length !== 3 || layers % 2 !== 1 || !(array.data instanceof Float32Array)) return null;
-  return {
-    planes: array.data,
-    harmonics: (layers - 1) / 2,
-    width,
-    height,
-    baseFrequency_hz: meta.base_frequency_hz,
-  };
+  return { planes: array.data, harmonics: (layers - 1) / 2, width, height, baseFrequency_hz: meta.base_frequency_hz };
 }
 
 /** A frame on its way to the page, with what views need to know of it as a whole. */

@@ -4,7 +4,7 @@ import type { Announcement } from "./announced";
 import { type ConnectionEvent, FrameGone, StreamConnection } from "./connection";
 import type { CameraDocument } from "./documents";
 import { frameUrl } from "./frameUrl";
-import { decodeMessage, type Problem, ProtocolError } from "./protocol";
+import { decodeMessage, type Problem, ProtocolError, problemOf } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
 
 /** What is passed on to the connection: what it is told, and the value of that. */
@@ -24,12 +24,7 @@ export type Command =
   | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
 
 /** What was brought of a frame; the problem is that of the first product that could not be. */
-export interface Brought {
-  readonly type: "brought";
-  readonly ticket: number;
-  readonly reports: readonly FrameReport[];
-  readonly problem: Problem | null;
-}
+export type Brought = Readonly<{ type: "brought"; ticket: number; reports: readonly FrameReport[]; problem: Problem | null }>;
 
 /** From the worker to the page. */
 export type Report = FrameReport | ConnectionEvent | Brought;
@@ -62,22 +57,20 @@ function onEvent(event: ConnectionEvent): void {
   }
 }
 
-function authorization(): Record<string, string> {
-  return token === null ? {} : { Authorization: `Bearer ${token}` };
+/** What the service answers under the token. */
+function ask(path: string, more: RequestInit = {}): Promise<Response> {
+  return fetch(interface_url + path, { headers: token === null ? {} : { Authorization: `Bearer ${token}` }, ...more });
 }
 
 async function askForCamera(): Promise<CameraDocument> {
-  const answer = await fetch(`${interface_url}/camera`, { headers: authorization(), signal: AbortSignal.timeout(4000) });
+  const answer = await ask("/camera", { signal: AbortSignal.timeout(4000) });
   if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
   return (await answer.json()) as CameraDocument;
 }
 
 /** What the stream announced. */
 async function requestFrame({ frame, product }: Announcement, query: string): Promise<ArrayBuffer> {
-  const answer = await fetch(`${interface_url}/frames/${frame}/${product}.msgpack${query}`, {
-    headers: authorization(),
-    cache: "no-store",
-  });
+  const answer = await ask(`/frames/${frame}/${product}.msgpack${query}`, { cache: "no-store" });
   if (GONE.includes(answer.status)) throw new FrameGone();
   if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
   return answer.arrayBuffer();
@@ -86,11 +79,8 @@ async function requestFrame({ frame, product }: Announcement, query: string): Pr
 /** One product of a frame by REST, or why it cannot be had. */
 async function fetchProduct(path: string, product: string): Promise<FrameReport | Problem> {
   try {
-    const answer = await fetch(interface_url + frameUrl(path, `${product}.msgpack`), { headers: authorization() });
-    if (!answer.ok) {
-      const problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
-      return { ...problem, ...((await answer.json().catch(() => ({}))) as Problem) };
-    }
+    const answer = await ask(frameUrl(path, `${product}.msgpack`));
+    if (!answer.ok) return await problemOf(answer);
     const message = decodeMessage(await answer.arrayBuffer());
     return message?.type === "frame" ? summarised(message) : { title: "The service sent something else than a frame." };
   } catch (error) {

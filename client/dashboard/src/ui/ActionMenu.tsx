@@ -3,15 +3,9 @@ import { useRef } from "preact/hooks";
 import { PopoverButton } from "./PopoverButton";
 import "./ActionMenu.css";
 
-export interface Action {
-  readonly text: string;
-  readonly run: () => void;
-}
+export type Action = Readonly<{ text: string; run: () => void }>;
 
-export interface ActionGroup {
-  readonly title: string;
-  readonly actions: readonly Action[];
-}
+export type ActionGroup = Readonly<{ title: string; actions: readonly Action[] }>;
 
 /**
  * Things to do, behind one small button: a menu after the WAI-ARIA pattern "menu button".
@@ -36,11 +30,8 @@ export function ActionMenu({ label, groups }: { label: string; groups: readonly 
     event.stopPropagation(); // keys of the page would move the light
     if (event.key === "Tab") menu.current?.hidePopover();
     const all = entries();
-    const next = neighbour(
-      all.map((entry) => entry.textContent ?? ""),
-      all.indexOf(document.activeElement as HTMLElement),
-      event.key,
-    );
+    const texts = all.map((entry) => entry.textContent ?? "");
+    const next = neighbour(texts, all.indexOf(document.activeElement as HTMLElement), event.key);
     if (next === null) return;
     event.preventDefault();
     all[next]?.focus();

@@ -61,7 +61,7 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
 
   useDrawing(() => {
     const context = canvas.current?.getContext("2d");
-    if (context) paintBar(context, base, scale, colours, values?.value?.values ?? null);
+    if (context) paintBar(context, base, scale, colours, values?.value?.values);
   }, [base, scale, colours, values]);
 
   const marker = useComputedOf([base, marked], () => {
@@ -167,13 +167,7 @@ function Handle({ end, base, scale, text, unit, held, onLimit }: HandleProps) {
 }
 
 /** Colours at the left, those beyond the scale only where there are values that may lie there; at the right how often each value occurs; both from the foot upwards. */
-function paintBar(
-  context: CanvasRenderingContext2D,
-  base: Scale,
-  scale: Scale,
-  colours: ColourMapName,
-  values: ArrayLike<number> | null,
-): void {
+function paintBar(context: CanvasRenderingContext2D, base: Scale, scale: Scale, colours: ColourMapName, values?: ArrayLike<number>): void {
   const table = colourTable(colours);
   const { under, over } = beyond(colours);
   const { width, height } = context.canvas;
@@ -182,14 +176,14 @@ function paintBar(
     const place = fraction(scale, valueAt(base, (1 - (row + 0.5) / height) * LENGTH - MARGIN));
     const level = 4 * Math.min(LEVELS - 1, levelOf(place));
     context.fillStyle =
-      values !== null && place < 0
+      values !== undefined && place < 0
         ? css(under)
-        : values !== null && place > 1
+        : values !== undefined && place > 1
           ? css(over)
           : `rgb(${table[level]} ${table[level + 1]} ${table[level + 2]})`;
     context.fillRect(0, row, COLOURS_PX, 1);
   }
-  if (values === null) return;
+  if (values === undefined) return;
   const counts = histogram(values, base, BINS, -MARGIN, 1 + MARGIN);
   const most = Math.max(1, ...counts);
   context.fillStyle = getComputedStyle(context.canvas).color;

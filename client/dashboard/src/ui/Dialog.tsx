@@ -58,15 +58,11 @@ interface SwitchedDialogProps {
   readonly inside: ComponentType<Done>;
 }
 
-export interface Done {
-  readonly onDone: () => void;
-}
+export type Done = Readonly<{ onDone: () => void }>;
 
 /** A dialog that is open while a signal says so. */
 export function SwitchedDialog({ open, title, inside: Inside }: SwitchedDialogProps) {
-  const close = (): void => {
-    open.value = false;
-  };
+  const close = (): void => void (open.value = false);
   return (
     <Dialog open={open.value} title={title} onClose={close}>
       <Inside onDone={close} />

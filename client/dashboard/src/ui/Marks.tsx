@@ -17,10 +17,7 @@ export function Marks({ width, height }: { width: number; height: number }) {
   );
 }
 
-interface SizeProps {
-  readonly width: number;
-  readonly height: number;
-}
+type SizeProps = Readonly<{ width: number; height: number }>;
 
 const percent = (share: number): string => `${100 * share}%`;
 

@@ -89,12 +89,8 @@ export function Stage({ label, frame, children }: StageProps) {
         drag.current = null;
       }, 1000 * STAYS_S);
     }
-    drag.current = {
-      kind: event.shiftKey ? "region" : event.ctrlKey || event.metaKey ? "corner" : "pan",
-      from: pixelAt(event),
-      last: event,
-      moved: false,
-    };
+    const kind = event.shiftKey ? "region" : event.ctrlKey || event.metaKey ? "corner" : "pan";
+    drag.current = { kind, from: pixelAt(event), last: event, moved: false };
     picture.current?.setPointerCapture(event.pointerId);
   };
   const onPointerMove = (event: PointerEvent): void => {

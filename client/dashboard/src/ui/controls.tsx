@@ -77,12 +77,7 @@ interface Tab<T extends string> {
   readonly obstacle?: string | undefined;
 }
 
-interface TabsProps<T extends string> {
-  readonly label: string;
-  readonly value: T;
-  readonly options: readonly Tab<T>[];
-  readonly onChange: (value: T) => void;
-}
+type TabsProps<T extends string> = Readonly<{ label: string; value: T; options: readonly Tab<T>[]; onChange: (value: T) => void }>;
 
 /** One of several, all in sight. Arrow keys move between them, as in any tab list. */
 export function Tabs<T extends string>({ label, value, options, onChange }: TabsProps<T>) {
@@ -120,12 +115,7 @@ export function Tabs<T extends string>({ label, value, options, onChange }: Tabs
   );
 }
 
-interface CheckProps {
-  readonly checked: boolean;
-  readonly title?: string;
-  readonly onChange: (checked: boolean) => void;
-  readonly children: ComponentChildren;
-}
+type CheckProps = Readonly<{ checked: boolean; title?: string; onChange: (checked: boolean) => void; children: ComponentChildren }>;
 
 /** A box that is ticked or not, with its words. */
 export function Check({ checked, title, onChange, children }: CheckProps) {
@@ -176,9 +166,7 @@ export function keptAs(value: string, onType: (text: string) => void): TypedProp
   };
 }
 
-interface FieldProps extends TypedProps {
-  readonly label: string;
-}
+type FieldProps = TypedProps & Readonly<{ label: string }>;
 
 /** Words as they are typed. */
 export function TextField({ label, class: kind = "field", ...input }: FieldProps) {

@@ -16,13 +16,8 @@ export function save(name: string, content: Blob): void {
 /** Hands a table out, comma-separated: names with their units first, and nothing where there is no value. */
 export function saveTable(name: string, rows: readonly (readonly (string | number | null | undefined)[])[]): void {
   const cell = (value: string | number | null | undefined): string => (value == null || Number.isNaN(value) ? "" : String(value));
-  save(
-    `${name}.csv`,
-    new Blob(
-      rows.map((row) => `${row.map(cell).join(",")}\n`),
-      { type: "text/csv" },
-    ),
-  );
+  const lines = rows.map((row) => `${row.map(cell).join(",")}\n`);
+  save(`${name}.csv`, new Blob(lines, { type: "text/csv" }));
 }
 
 /**

@@ -29,15 +29,10 @@ async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts:
   const context = drawn.getContext("2d") as CanvasRenderingContext2D;
   // The picture first, before anything moves, and pixel by pixel: a browser may smooth what is within an SVG.
   context.imageSmoothingEnabled = false;
-  context.drawImage(
-    canvas,
-    PNG_SCALE * layout.left,
-    PNG_SCALE * layout.top,
-    PNG_SCALE * layout.pictureWidth,
-    PNG_SCALE * layout.pictureHeight,
-  );
+  context.scale(PNG_SCALE, PNG_SCALE);
+  context.drawImage(canvas, layout.left, layout.top, layout.pictureWidth, layout.pictureHeight);
   context.globalCompositeOperation = "destination-over";
-  context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
+  context.drawImage(await imageOf(svg), 0, 0, layout.width, layout.height);
   const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
 }

@@ -3,6 +3,7 @@ import { Fragment } from "preact";
 import { useRef } from "preact/hooks";
 import { below, beside, closed, isStack, type Layout, type Row, replaced, type Slot, split, viewsOf } from "../store/layout";
 import { type Store, useStore } from "../store/store";
+import type { ActionGroup } from "../ui/ActionMenu";
 import { DRAGGED, Panel, SlotContext } from "../ui/Panel";
 import { VIEWS } from "./registry";
 import "./Arrangement.css";
@@ -73,7 +74,10 @@ function Place({ view, share }: Slot) {
     store.alone.value = null;
   };
   const free = VIEWS.filter(({ name }) => !viewsOf(layout).includes(name));
-  const room = (made: (wanted: string) => Layout | null) => free.filter(({ name }) => made(name) !== null);
+  const adding = (title: string, sign: string, made: typeof beside): ActionGroup => {
+    const room = free.filter(({ name }) => made(layout, view, name) !== null);
+    return { title, actions: room.map((each) => ({ text: `${each.title} ${sign}`, run: set(made(layout, view, each.name)) })) };
+  };
   const groups = [
     {
       title: "Show here",
@@ -82,20 +86,8 @@ function Place({ view, share }: Slot) {
         run: store.alone.value === null ? set(replaced(layout, view, name)) : () => (store.alone.value = name),
       })),
     },
-    {
-      title: "Add to the right",
-      actions: room((name) => beside(layout, view, name)).map(({ name, title }) => ({
-        text: `${title} →`,
-        run: set(beside(layout, view, name)),
-      })),
-    },
-    {
-      title: "Add below",
-      actions: room((name) => below(layout, view, name)).map(({ name, title }) => ({
-        text: `${title} ↓`,
-        run: set(below(layout, view, name)),
-      })),
-    },
+    adding("Add to the right", "→", beside),
+    adding("Add below", "↓", below),
     {
       title: "Panel",
       actions: [

@@ -26,13 +26,7 @@ export interface Model {
 }
 
 /** What the model says of its coefficients. */
-interface Shape {
-  readonly frame: number;
-  readonly harmonics: number;
-  readonly width: number;
-  readonly height: number;
-  readonly base_frequency_hz: number;
-}
+type Shape = Readonly<{ frame: number; harmonics: number; width: number; height: number; base_frequency_hz: number }>;
 
 /** The coefficients that a model holds. */
 export function coefficientsIn(model: Model): Coefficients {
@@ -127,10 +121,7 @@ export function render({ model, el }: { readonly model: Model; readonly el: HTML
   model.on("change:time_s", seek);
 
   const ends = [
-    effect(() => {
-      const { arrivals } = light.value;
-      player.lit.value = litOf(arrivals);
-    }),
+    effect(() => void (player.lit.value = litOf(light.value.arrivals))),
     effect(() => {
       const white = light.value.peak > 0 ? light.value.peak : 1;
       const phase_rad = player.phase_rad.value;
@@ -138,9 +129,7 @@ export function render({ model, el }: { readonly model: Model; readonly el: HTML
       time.value = String(player.turn.value);
       readout.value = timeWords(player.time_s.value, rangeOfTime_m(player.time_s.value));
     }),
-    effect(() => {
-      play.textContent = player.playing.value ? "Pause" : "Play";
-    }),
+    effect(() => void (play.textContent = player.playing.value ? "Pause" : "Play")),
   ];
   frame.value = String(model.get("index"));
   seek();

@@ -1,6 +1,5 @@
 import { useSignal } from "@preact/signals";
 import { engineering, fixed } from "../../scales/format";
-import { calibrationPath } from "../../store/api";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, VerdictDocument } from "../../stream/documents";
 import { ActionMenu } from "../../ui/ActionMenu";
@@ -94,7 +93,9 @@ export function CalibrationRow({ calibration, task, onDelete }: { calibration: C
         aria-label={`Export ${called}`}
         title="Its file, to be taken in elsewhere"
         task={task}
-        onClick={() => void task.run("Fetching the file…", () => download(api, `${calibrationPath(id)}/file`, `${id}.npz`))}
+        onClick={() =>
+          void task.run("Fetching the file…", () => download(api, `/calibrations/${encodeURIComponent(id)}/file`, `${id}.npz`))
+        }
       >
         Export
       </Button>

@@ -7,9 +7,7 @@ import type { RecordingDocument } from "../../stream/documents";
 const LONGEST_SCENE = 65_536;
 
 /** What of a File is used. */
-export interface OpenedFile extends Blob {
-  readonly name: string;
-}
+export type OpenedFile = Blob & Readonly<{ name: string }>;
 
 /** Opens a file by what it is, and says what came of it. */
 export async function openFile(store: Store, file: OpenedFile): Promise<void> {

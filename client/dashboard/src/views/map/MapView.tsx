@@ -47,6 +47,7 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
   const picture = usePicture(now, look, b);
   const canvas = useRef<HTMLCanvasElement>(null);
   const compared = (): string => (now === "A" ? "" : ` ${now === "difference" ? "minus" : `(${now})`} ${sourceWords(store)}`);
+  const fileName = (): string => `${look.product.product}-${picture.peek()?.meta.frame ?? 0}`;
   const parts = (): FigureParts | null => {
     const meta = picture.peek()?.meta;
     if (meta === undefined) return null;
@@ -63,11 +64,7 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
     <Panel
       name={name}
       downloads={[
-        ...pictureFiles(
-          () => `${look.product.product}-${picture.peek()?.meta.frame ?? 0}`,
-          () => canvas.current,
-          parts,
-        ),
+        ...pictureFiles(fileName, () => canvas.current, parts),
         { text: `${look.product.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, picture.peek()) },
       ]}
       title={

@@ -35,6 +35,9 @@ export function commandsOf(store: Store): Command[] {
   const steering = store.obstacle.value === null;
   const scenes = steering ? (store.simulation.world.value?.scenes ?? []) : [];
   const applied = steering ? store.sequence.value : null;
+  const { recordings, events } = store;
+  const active = recordings.active.value;
+  const does = (words: string, work: () => Promise<unknown>): Command => ({ words, run: () => void events.reported(work) });
   return [
     ...store.frames.maps.value.map(({ product, name }, at) => ({
       words: `Map: ${name}`,
@@ -60,15 +63,12 @@ export function commandsOf(store: Store): Command[] {
     { words: "Panel: colours, limits and exposure of its picture…", also: "colormap look scale", run: () => press(".look-button") },
     ...(applied === null
       ? []
-      : PRESETS.map(({ name, sequence }) => ({
-          words: `Sequence: ${name}`,
-          run: () => void store.events.reported(() => store.sequencing.set({ ...applied, ...sequence })),
-        }))),
-    ...scenes.map(({ name }) => ({
-      words: `Scene: ${name}`,
-      run: () => void store.events.reported(() => store.simulation.set({ scene: name })),
-    })),
-    ...recordingCommands(store),
+      : PRESETS.map(({ name, sequence }) => does(`Sequence: ${name}`, () => store.sequencing.set({ ...applied, ...sequence })))),
+    ...scenes.map(({ name }) => does(`Scene: ${name}`, () => store.simulation.set({ scene: name }))),
+    // Recordings need no control of the camera.
+    ...(active === null
+      ? [does("Recording: start", () => recordings.start({})), does(`Recording: save the last ${PAST_S} s`, () => recordings.savePast())]
+      : [does("Recording: stop", () => recordings.stop(active.id))]),
     ...SHORTCUTS.filter(({ shown }) => shown.length === 1 && shown !== "K").map(({ keys, shown, words, run }) => ({
       words: `Page: ${words}`,
       key: shown,
@@ -84,18 +84,6 @@ function press(button: string): void {
 
 function toggleFullScreen(): void {
   void (document.fullscreenElement === null ? document.documentElement.requestFullscreen() : document.exitFullscreen());
-}
-
-/** Recordings need no control of the camera. */
-function recordingCommands(store: Store): Command[] {
-  const { recordings } = store;
-  const active = recordings.active.value;
-  const does = (what: string, work: () => Promise<unknown>): Command => ({
-    words: `Recording: ${what}`,
-    run: () => void store.events.reported(work),
-  });
-  if (active !== null) return [does("stop", () => recordings.stop(active.id))];
-  return [does("start", () => recordings.start({})), does(`save the last ${PAST_S} s`, () => recordings.savePast())];
 }
 
 /** Those that hold every word of a query, or are also called so, whatever its case and order; at whose beginning one stands come first. */

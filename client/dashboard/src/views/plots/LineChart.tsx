@@ -53,12 +53,7 @@ function makePlot(
       ],
       series: [
         {},
-        ...lines.map(({ name, colour }) => ({
-          label: name,
-          stroke: colour.startsWith("--") ? ink(colour) : colour,
-          width: 1.5,
-          spanGaps: false,
-        })),
+        ...lines.map(({ name, colour }) => ({ label: name, stroke: colour.startsWith("--") ? ink(colour) : colour, width: 1.5 })),
       ],
     },
     [[], ...lines.map(() => [])],

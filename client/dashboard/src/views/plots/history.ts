@@ -6,10 +6,7 @@ export const KEPT_S = 10;
 /** Frames that are kept at most, whatever their rate. */
 const MOST = 2000;
 
-interface Sample {
-  readonly time_s: number;
-  readonly values: ReadonlyMap<string, number>;
-}
+type Sample = Readonly<{ time_s: number; values: ReadonlyMap<string, number> }>;
 
 /** What a series did over the time that is kept. */
 export interface SeriesFigures {

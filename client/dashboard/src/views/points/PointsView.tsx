@@ -113,16 +113,8 @@ export function PointsView() {
     if (flags !== null) return byFlags(flags.values);
     if (coefficients !== null && coefficients.width * coefficients.height === frame.values.length) {
       if (lit.pixels.length !== frame.values.length) lit.pixels = new Uint32Array(frame.values.length);
-      lit.painter.paint(
-        coefficients,
-        {
-          phase_rad: store.player.phase_rad.value,
-          tone: light.toneNow,
-          colours: light.colours.value,
-          backdrop: backdropOf(amplitude, light),
-        },
-        lit.pixels,
-      );
+      const [phase_rad, backdrop] = [store.player.phase_rad.value, backdropOf(amplitude, light)];
+      lit.painter.paint(coefficients, { phase_rad, tone: light.toneNow, colours: light.colours.value, backdrop }, lit.pixels);
       return byPicture(lit.pixels);
     }
     if (chosen === "light" && amplitude !== null) return byValue(amplitude.values, lightLook.scale.value, lightLook.colours.value);
@@ -133,13 +125,8 @@ export function PointsView() {
     if (frame === null || drawn === null || made === 0) return;
     colourCloud(drawn.cloudFor(frame.values.length), count.peek(), painter(frame, chosen));
     drawn.recolour();
-    if (canvas.current !== null)
-      Object.assign(canvas.current.dataset, {
-        frame: frame.meta.frame,
-        points: count.peek(),
-        colouring: chosen,
-        ...rangeLook.scale.peek(),
-      });
+    const shown = { frame: frame.meta.frame, points: count.peek(), colouring: chosen, ...rangeLook.scale.peek() };
+    if (canvas.current !== null) Object.assign(canvas.current.dataset, shown);
   }, [scene, range]);
 
   const saveShown = (): void => {

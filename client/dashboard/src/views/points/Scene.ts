@@ -37,11 +37,7 @@ const AXES: readonly (readonly number[])[] = [
 ];
 
 /** The picture that a cloud is made of. */
-export interface Field {
-  readonly width: number;
-  readonly height: number;
-  readonly lens: Pinhole;
-}
+export type Field = Readonly<{ width: number; height: number; lens: Pinhole }>;
 
 export class PointScene {
   readonly #renderer: WebGLRenderer;

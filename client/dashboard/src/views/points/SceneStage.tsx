@@ -17,13 +17,7 @@ interface SceneStageProps {
 }
 
 /** What is written over the scene, at a place in CSS px. */
-interface Mark {
-  readonly kind: "label" | "pin" | "selected" | "pointed";
-  readonly x: number;
-  readonly y: number;
-  readonly text: string;
-  readonly colour?: string;
-}
+type Mark = Readonly<{ kind: "label" | "pin" | "selected" | "pointed"; x: number; y: number; text: string; colour?: string }>;
 
 /** How far a pointer may move in CSS px and still click; turn of one press of an arrow key. */
 const CLICK_PX = 4;

@@ -27,10 +27,7 @@ export function lensOf(store: Store, width: number, height: number): Lens {
 }
 
 /** A pixel with its range and the deviation of that, both in m. */
-export interface Ranged extends Pixel {
-  readonly range_m: number;
-  readonly error_m: number;
-}
+export type Ranged = Pixel & Readonly<{ range_m: number; error_m: number }>;
 
 /** Distance of what two pixels see, and its standard deviation by that of both ranges, to first order; in m. */
 export function distanceOf(lens: Lens, a: Ranged, b: Ranged): { readonly distance_m: number; readonly error_m: number } {

@@ -3,15 +3,10 @@
 /** How far a point may be from the pointer to be meant, in CSS px. */
 const REACH_PX = 8;
 
+type Seen = Readonly<{ x: number; y: number; depth: number }>;
+
 /** Where a point is on a screen of this size, in px from its upper left; null behind the eye. `matrix` is projection times view, by columns. */
-export function onScreen(
-  matrix: ArrayLike<number>,
-  x: number,
-  y: number,
-  z: number,
-  width: number,
-  height: number,
-): { readonly x: number; readonly y: number; readonly depth: number } | null {
+export function onScreen(matrix: ArrayLike<number>, x: number, y: number, z: number, width: number, height: number): Seen | null {
   const depth = matrix[3] * x + matrix[7] * y + matrix[11] * z + matrix[15];
   if (depth <= 0) return null;
   const across = (matrix[0] * x + matrix[4] * y + matrix[8] * z + matrix[12]) / depth;

@@ -1,12 +1,7 @@
 /** Along which rays the pixels of a camera look, as the service's point clouds have them. */
 
 /** A pinhole camera, in pixels: a pixel looks along ((x - cx) / fx, (y - cy) / fy, 1), y down; centres are whole numbers. */
-export interface Pinhole {
-  readonly fx: number;
-  readonly fy: number;
-  readonly cx: number;
-  readonly cy: number;
-}
+export type Pinhole = Readonly<{ fx: number; fy: number; cx: number; cy: number }>;
 
 /** A camera whose lens bends rays, and whose light may stand aside, in m to the right, below and before the lens. */
 export interface Lens extends Pinhole {
@@ -41,10 +36,7 @@ function bentBack(xd: number, yd: number, [k1, k2, p1, p2, k3]: readonly number[
   return [NaN, NaN];
 }
 
-interface Rays {
-  readonly width: number;
-  readonly slopes: Float64Array;
-}
+type Rays = Readonly<{ width: number; slopes: Float64Array }>;
 
 const KNOWN = new WeakMap<Lens, Rays>();
 
@@ -64,13 +56,8 @@ export function raysOf(lens: Lens, width: number, height: number): Float64Array 
 }
 
 /** How far along its ray the light of a range turned back: |p| + |p - light| is twice the range; NaN where that is too short. */
-export function alongRay(
-  { light_x_m = 0, light_y_m = 0, light_z_m = 0 }: Lens,
-  range_m: number,
-  x: number,
-  y: number,
-  unit: number,
-): number {
+export function alongRay(lens: Lens, range_m: number, x: number, y: number, unit: number): number {
+  const { light_x_m = 0, light_y_m = 0, light_z_m = 0 } = lens;
   const square = light_x_m ** 2 + light_y_m ** 2 + light_z_m ** 2;
   if (square === 0) return range_m;
   const around = 4 * range_m * range_m - square;

@@ -63,10 +63,7 @@ export function gridLines({ y, step, left, right, far, near }: Floor): Float32Ar
 }
 
 /** A number that stands somewhere in the room. */
-export interface Label {
-  readonly at: readonly [number, number, number];
-  readonly value_m: number;
-}
+export type Label = Readonly<{ at: readonly [number, number, number]; value_m: number }>;
 
 /** How far lines of the grid are from the camera, beside their right ends. */
 export function gridLabels({ y, step, right, far, near }: Floor): Label[] {

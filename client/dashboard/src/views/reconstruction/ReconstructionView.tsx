@@ -84,12 +84,7 @@ export function ReconstructionView() {
   );
 }
 
-interface ParameterProps {
-  readonly parameter: ParameterDocument;
-  readonly text: string;
-  readonly wrong: boolean;
-  readonly onInput: (text: string) => void;
-}
+type ParameterProps = Readonly<{ parameter: ParameterDocument; text: string; wrong: boolean; onInput: (text: string) => void }>;
 
 /** One thing that can be set. */
 function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {

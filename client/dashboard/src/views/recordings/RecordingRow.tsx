@@ -20,12 +20,7 @@ const STATES: Readonly<Record<RecordingDocument["state"], string | null>> = {
   damaged: "damaged",
 };
 
-interface RowProps {
-  readonly recording: RecordingDocument;
-  readonly task: Task;
-  readonly onAnnotate: () => void;
-  readonly onDelete: () => void;
-}
+type RowProps = Readonly<{ recording: RecordingDocument; task: Task; onAnnotate: () => void; onDelete: () => void }>;
 
 /** One recording of the list. */
 export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps) {

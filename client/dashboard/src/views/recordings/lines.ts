@@ -1,9 +1,6 @@
 /** Annotations as lines of text: values that are no text are written as JSON. */
 
-export interface Line {
-  readonly name: string;
-  readonly text: string;
-}
+export type Line = Readonly<{ name: string; text: string }>;
 
 export function linesOf(annotations: Readonly<Record<string, unknown>>): Line[] {
   return Object.entries(annotations).map(([name, value]) => ({

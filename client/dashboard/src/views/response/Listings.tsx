@@ -7,18 +7,10 @@ import type { FlagHistory } from "./flagShares";
 import { linesOf, type ReturnHistory, type ReturnLine, sifted } from "./returns";
 import "./Listings.css";
 
+type FoundProps = Readonly<{ details: PixelDocument | null; of: number | null; flags: FlagHistory; returns: ReturnHistory }>;
+
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `of` is the number of the frame that the curves are of. */
-export function Found({
-  details,
-  of,
-  flags,
-  returns,
-}: {
-  details: PixelDocument | null;
-  of: number | null;
-  flags: FlagHistory;
-  returns: ReturnHistory;
-}) {
+export function Found({ details, of, flags, returns }: FoundProps) {
   const { frames } = useStore();
   if (details === null) return null;
   const scene = frames.sceneOf(details.meta);

@@ -116,7 +116,7 @@ export function ResponseView() {
 
 /** Selects a pixel worth looking at with the first frame, unless one was selected before; the answer ends it. */
 function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => void {
-  const end = effect(() => {
+  return effect(() => {
     const newest = frame.value;
     if (store.selected.value !== null || newest === null) return;
     const [height, width] = newest.shape;
@@ -124,12 +124,9 @@ function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => v
     // a slow browser has every second pixel while light plays: one of these keeps its curve
     untracked(() => (store.selected.value = pixel && { x: pixel.x & ~1, y: pixel.y & ~1 }));
   });
-  return end;
 }
 
-interface Shown extends Subject {
-  readonly pixel: Pixel;
-}
+type Shown = Subject & Readonly<{ pixel: Pixel }>;
 
 interface PlotProps {
   readonly aspect: Aspect;

@@ -36,10 +36,7 @@ const LEAST_SHARE = 0.02;
 const COMPLETE = 0.999;
 
 /** A pixel of a frame. */
-export interface Subject {
-  readonly coefficients: Coefficients;
-  readonly index: number;
-}
+export type Subject = Readonly<{ coefficients: Coefficients; index: number }>;
 
 /** What is drawn of a pixel. */
 export interface Drawn {
@@ -54,30 +51,22 @@ export type PinLines = ReadonlyMap<PinName, Float64Array>;
 export function drawnOf(aspect: Aspect, { coefficients: c, index }: Subject, pins: readonly Pin[], truth: Truth | null): Drawn {
   const inside = pins.filter(({ x, y }) => x < c.width && y < c.height).map(({ name, x, y }) => [name, y * c.width + x] as const);
   // All at the same times, which are finer around each one's peaks.
-  const phases_rad = phasesOf(c, [index, ...inside.map(([, pixel]) => pixel)]);
+  const pixels = [index, ...inside.map(([, pixel]) => pixel)];
+  const peaked = pixels.map((pixel) => ({ pixel, peaks: peaks(c, pixel).filter(({ share }) => share >= LEAST_SHARE) }));
+  const phases_rad = phasesAround(c, SAMPLES, peaked);
   return {
     curves: curvesOf(aspect, c, index, phases_rad, truth),
     ofPins: new Map(inside.map(([name, pixel]) => [name, curvesOf(aspect, c, pixel, phases_rad, null).lines[ESTIMATES[aspect]]])),
   };
 }
 
-/** Phases that show the curves of some pixels, finer around the peaks of each. */
-function phasesOf(c: Coefficients, pixels: readonly number[]): Float64Array {
-  return phasesAround(
-    c,
-    SAMPLES,
-    pixels.map((pixel) => ({ pixel, peaks: peaks(c, pixel).filter(({ share }) => share >= LEAST_SHARE) })),
-  );
-}
-
 /** The curves of one pixel. `truth` is drawn beside them where it is complete. */
 function curvesOf(aspect: Aspect, c: Coefficients, pixel: number, phases_rad: Float64Array, truth: Truth | null): Curves {
   const response = impulseResponse(c, pixel, phases_rad);
   const time_ns = response.time_s.map((time_s) => time_s * 1e9);
-  const lines = (): Float64Array[] => LINES[aspect].map(() => new Float64Array(time_ns.length).fill(NaN));
   const whole = wholeOf(truth);
   if (aspect === "density") return { aspect, time_ns, lines: [response.density.map((value) => value * 1e-9)] };
-  const made = lines();
+  const made = LINES[aspect].map(() => new Float64Array(time_ns.length).fill(NaN));
   if (aspect === "bounds") {
     const levinson = pixelOf(c, pixel);
     const perNs = TURN * c.baseFrequency_hz * 1e-9;

@@ -35,7 +35,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_
   const { ink, axis } = inkOf(box);
   const [line, wash, truthInk] = ["--curve", "--curve-wash", "--truth"].map(ink);
   let stems = NO_STEMS;
-  const solid = { stroke: line, width: 1.5, points: { show: false }, spanGaps: false };
+  const solid = { stroke: line, width: 1.5, points: { show: false } };
   const edge = { ...solid, width: 0.75 };
   const true_ = { ...solid, stroke: truthInk, width: 1.25, dash: [5, 4] };
   const series: Record<Aspect, uPlot.Series[]> = {

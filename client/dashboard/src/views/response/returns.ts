@@ -10,12 +10,10 @@ const SAME_S = 1e-9;
 /** The fewest looks that a deviation is computed from. */
 const FEWEST = 5;
 
+type Sifted = Readonly<{ strong: readonly ReturnDocument[]; weak: number; weakShare: number }>;
+
 /** The returns that are worth a line, by time, and the light of the others together. */
-export function sifted(returns: readonly ReturnDocument[]): {
-  readonly strong: readonly ReturnDocument[];
-  readonly weak: number;
-  readonly weakShare: number;
-} {
+export function sifted(returns: readonly ReturnDocument[]): Sifted {
   const light = returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
   const strong = returns.filter(({ weight }) => weight >= WEAK_SHARE * light).sort((a, b) => a.time_s - b.time_s);
   const rest = returns.filter((each) => !strong.includes(each));
@@ -23,10 +21,7 @@ export function sifted(returns: readonly ReturnDocument[]): {
 }
 
 /** A line of the table: what was found, what is true, or both. */
-export interface ReturnLine {
-  readonly found: ReturnDocument | null;
-  readonly truth: ReturnDocument | null;
-}
+export type ReturnLine = Readonly<{ found: ReturnDocument | null; truth: ReturnDocument | null }>;
 
 /** Returns beside the true ones, by time. The two are the same one where each is the nearest to the other. */
 export function linesOf(found: readonly ReturnDocument[], truth: readonly ReturnDocument[]): ReturnLine[] {

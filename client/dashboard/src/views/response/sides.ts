@@ -4,11 +4,7 @@ import { oneOf, type Setting } from "../../store/settings";
 export type Aspect = "density" | "bounds" | "cumulative";
 export type Side = Aspect | "moments";
 
-interface Words<T> {
-  readonly value: T;
-  readonly text: string;
-  readonly hint: string;
-}
+type Words<T> = Readonly<{ value: T; text: string; hint: string }>;
 
 export const ASPECTS: readonly Words<Aspect>[] = [
   { value: "density", text: "Density", hint: "The maximum entropy density" },

@@ -14,22 +14,16 @@ interface Stem {
 }
 
 /** The returns that were found and those that are true. */
-export interface Stems {
-  readonly found: readonly Stem[];
-  readonly truth: readonly Stem[];
-}
+export type Stems = Readonly<{ found: readonly Stem[]; truth: readonly Stem[] }>;
 
 export const NO_STEMS: Stems = { found: [], truth: [] };
 
 /** The returns of a pixel that have a line in its table. */
 export function stemsOf(details: Pick<PixelDocument, "returns">, truth: Truth | null, history: ReturnHistory): Stems {
   const light = details.returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
+  const { strong } = sifted(details.returns);
   return {
-    found: sifted(details.returns).strong.map((each) => ({
-      time_s: each.time_s,
-      std_s: history.of(each).time_s,
-      share: each.weight / light,
-    })),
+    found: strong.map((each) => ({ time_s: each.time_s, std_s: history.of(each).time_s, share: each.weight / light })),
     truth: (truth?.returns ?? []).map(({ time_s, weight }) => ({ time_s, std_s: NaN, share: weight / (truth?.brightness ?? NaN) })),
   };
 }

@@ -29,9 +29,7 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
   const truth_m = judged ? (tradeoff.current.range_error_m?.median ?? null) : null;
   const looked = accuracy.looked.value;
   const busy = accuracy.job.value !== null || task.busy.value !== null;
-  const look = (choice: ChoiceDocument): void => {
-    accuracy.looked.value = choice;
-  };
+  const look = (choice: ChoiceDocument): void => void (accuracy.looked.value = choice);
   const apply = async (): Promise<void> => {
     const choice = accuracy.looked.peek();
     if (choice === null || obstacle.peek() !== null) return;

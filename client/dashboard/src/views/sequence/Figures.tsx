@@ -79,12 +79,7 @@ export function Figures({ applied }: { applied: AppliedDocument }) {
   );
 }
 
-interface FactProps {
-  readonly name: string;
-  readonly value: string;
-  readonly field: string;
-  readonly strong?: boolean;
-}
+type FactProps = Readonly<{ name: string; value: string; field: string; strong?: boolean }>;
 
 /** One named fact. */
 export function Fact({ name, value, field, strong = false }: FactProps) {

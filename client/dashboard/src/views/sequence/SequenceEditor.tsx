@@ -47,9 +47,9 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
     };
   }, [JSON.stringify(document), missingOf(draft.value)]);
 
-  const ask = async (asked: SequenceRequest, signal: AbortSignal): Promise<void> => {
+  const ask = async (body: SequenceRequest, signal: AbortSignal): Promise<void> => {
     try {
-      verdict.value = { kind: "valid", applied: await store.api.validate(asked, signal) };
+      verdict.value = { kind: "valid", applied: await store.api.ask("POST /sequence/validate", { body, signal }) };
     } catch (error) {
       if (!signal.aborted) verdict.value = refusal(error);
     }
@@ -70,9 +70,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
 
   const judged = verdict.value;
   const wrong = judged.kind === "refused" ? fieldOf(judged.problem) : null;
-  const set = (change: Partial<Draft>): void => {
-    draft.value = { ...draft.peek(), ...change };
-  };
+  const set = (change: Partial<Draft>): void => void (draft.value = { ...draft.peek(), ...change });
 
   return (
     <Form class="editor column grow spaced fades" onSubmit={() => void apply()}>

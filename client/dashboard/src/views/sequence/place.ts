@@ -4,15 +4,9 @@ import { fraction, type Scale, ticks } from "../../scales/scale";
 import { plannedError_m } from "../../store/rangeErrors";
 import type { AppliedDocument, ChoiceDocument, FrameMeta, TradeoffDocument } from "../../stream/documents";
 
-export interface Ends {
-  readonly time: Scale;
-  readonly error: Scale;
-}
+export type Ends = Readonly<{ time: Scale; error: Scale }>;
 
-export interface Standing {
-  readonly capture_s: number;
-  readonly range_error_m: number;
-}
+export type Standing = Readonly<{ capture_s: number; range_error_m: number }>;
 
 /** Room around what is shown, as a factor. */
 const ROOM = 1.25;
@@ -20,11 +14,7 @@ const ROOM = 1.25;
 /** Scales, in s and m, that hold the front and the frame beside which it was predicted: what follows trembles, and the axes must not. */
 export function endsOf({ front, current }: TradeoffDocument): Ends {
   const times = [current.capture_s, ...front.map(({ capture_s }) => capture_s)];
-  const errors = front.flatMap(({ predicted }) => [
-    predicted.range_error_m.low,
-    predicted.range_error_m.high ?? predicted.range_error_m.low,
-    predicted.range_error_m.median,
-  ]);
+  const errors = front.map(({ predicted }) => predicted.range_error_m).flatMap(({ low, high, median }) => [low, high ?? low, median]);
   const then = plannedError_m(current.meta.accuracy);
   if (then !== null) errors.push(then);
   const scale = (values: readonly number[]): Scale => ({

@@ -65,10 +65,7 @@ export const ZEROTH_COSTS: Record<Zeroth, string> = {
 };
 
 /** How takes follow each other, in words. */
-export const TAKE_ORDER_NAMES: Readonly<Record<TakeOrder, string>> = {
-  sequential: "one after another",
-  interleaved: "image by image",
-};
+export const TAKE_ORDER_NAMES: Readonly<Record<TakeOrder, string>> = { sequential: "one after another", interleaved: "image by image" };
 
 /** What an error of the range holds. */
 export function errorWords(error: RangeErrorFigure | null): string {

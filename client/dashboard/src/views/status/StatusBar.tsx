@@ -40,11 +40,7 @@ export function StatusBar() {
 /** A class of the style sheet. */
 type Tone = "good" | "waiting" | "bad" | "quiet";
 
-interface State {
-  readonly tone: Tone;
-  readonly word: string;
-  readonly why?: string;
-}
+type State = Readonly<{ tone: Tone; word: string; why?: string }>;
 
 function StateChip() {
   const { status, held, replay, calibrating, sequence } = useStore();
@@ -63,12 +59,7 @@ function StateChip() {
     return { tone: "good", word: "Live" };
   });
   const { tone, word, why } = slowed(state.value, flowTrouble(status.flow.value, sequence.value?.frame_rate_hz ?? null, now_s));
-  return (
-    <span class={`chip inline-row nowrap strong ${tone}`} role="status" data-field="state" title={why}>
-      <i class={tone === "quiet" ? "dot square" : "dot"} aria-hidden="true" />
-      {word}
-    </span>
-  );
+  return <Sign field="state" short={word} long={why} tone={tone} />;
 }
 
 /** A live camera whose frames come too seldom or too late is not well. */
@@ -147,10 +138,10 @@ function Fault() {
 }
 
 /** A sign in the header, and what it means. */
-function Sign({ field, short, long }: { field: string; short: string; long: string }) {
+function Sign({ field, short, long, tone = "waiting sign" }: { field: string; short: string; long: string | undefined; tone?: string }) {
   return (
-    <span class="chip inline-row nowrap strong waiting sign" role="status" data-field={field} title={long}>
-      <i class="dot" aria-hidden="true" />
+    <span class={`chip inline-row nowrap strong ${tone}`} role="status" data-field={field} title={long}>
+      <i class={tone === "quiet" ? "dot square" : "dot"} aria-hidden="true" />
       {short}
     </span>
   );

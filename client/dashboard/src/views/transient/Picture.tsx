@@ -29,9 +29,6 @@ export function Picture({ look }: { look: TransientLook }) {
   // A canvas keeps the kind of its context, and a lost one stays lost: each attempt gets a new canvas.
   useEffect(() => {
     if (canvas.current === null) return undefined;
-    const tryAgain = (): void => {
-      attempt.value += 1;
-    };
     let made: DensityRenderer;
     try {
       made = createRenderer(canvas.current, attempt.peek() < GRAPHICS_TRIES && hasGraphics());
@@ -40,7 +37,7 @@ export function Picture({ look }: { look: TransientLook }) {
       attempt.value = GRAPHICS_TRIES;
       return undefined;
     }
-    made.onLost(tryAgain);
+    made.onLost(() => (attempt.value += 1));
     renderer.value = made;
     canvas.current.dataset.renderer = made.kind;
     return () => {

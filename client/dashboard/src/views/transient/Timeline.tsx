@@ -38,9 +38,7 @@ export function Timeline() {
 
   // The pointer may be let go anywhere.
   useEffect(() => {
-    const release = (): void => {
-      player.scrubbed.value = false;
-    };
+    const release = (): void => void (player.scrubbed.value = false);
     for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, release);
     return () => {
       for (const end of ["pointerup", "pointercancel"]) window.removeEventListener(end, release);

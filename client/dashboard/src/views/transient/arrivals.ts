@@ -38,11 +38,8 @@ export function litOf(arrivals: ArrayLike<number>): Lit | null {
 export function gapsOf(arrivals: ArrayLike<number>): Lit[] {
   const worth = worthOf(arrivals);
   const lit = worth.flatMap((is, at) => (is ? [at] : []));
-  const [before, after] = [
-    [-1, ...lit],
-    [...lit, worth.length],
-  ];
-  const gaps = before.map((at, n) => ({ first: (at + 1) / worth.length, last: after[n] / worth.length }));
+  const after = [...lit, worth.length];
+  const gaps = [-1, ...lit].map((at, n) => ({ first: (at + 1) / worth.length, last: after[n] / worth.length }));
   return lit.length === 0 ? [] : gaps.filter(({ first, last }) => last > first);
 }
 

@@ -18,10 +18,7 @@ const LONGEST_S = 2;
 const FIRST_S = 0.1;
 
 /** What a film is made of: the picture now, and what is written around it. */
-export interface Subject {
-  readonly snapshot: () => HTMLCanvasElement | null;
-  readonly parts: () => FigureParts;
-}
+export type Subject = Readonly<{ snapshot: () => HTMLCanvasElement | null; parts: () => FigureParts }>;
 
 /** The canvas of a film; `draw` brings it up to date. Null before there is a picture. */
 async function plateOf({ snapshot, parts }: Subject, store: Store): Promise<{ canvas: HTMLCanvasElement; draw: () => void } | null> {
