@@ -162,11 +162,7 @@ class Service:
         simulated = camera.simulation is not None
         twin = partial(snapshot_of, camera, settings.camera) if simulated else None
         self.looks = Looks(
-            self.planner,
-            self.workers,
-            self.planning,
-            twin,
-            calibrated_c=self._calibrated_c,
+            self.planner, self.workers, self.planning, twin, calibrated_c=self._calibrated_c
         )
         self.fronts = FrontCache(
             self.planner, self.workers, self.planning, self.looks, simulated=simulated

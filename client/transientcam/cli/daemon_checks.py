@@ -100,11 +100,7 @@ def _versions(found: dict[str, Any]) -> Finding:
 
 def _ready(http: httpx.Client, base: str, *, timeout_s: float) -> Finding:
     try:
-        with (
-            translated(base),
-            within(timeout_s),
-            http.stream("GET", f"{base}/readyz") as response,
-        ):
+        with translated(base), within(timeout_s), http.stream("GET", f"{base}/readyz") as response:
             body = read(response, most_bytes=MOST_DOCUMENT_BYTES).body
     except TransientcamError as error:
         return Finding("fault", "ready", str(error), "look into the daemon's log")

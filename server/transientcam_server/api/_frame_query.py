@@ -123,8 +123,7 @@ async def _frame_query(
         Query(max_length=MAX_BINS, description="times of flight in seconds; may be repeated"),
     ] = None,
     bins: Annotated[
-        int | None,
-        Query(ge=1, le=MAX_BINS, description="evenly spaced times from 0 to one period"),
+        int | None, Query(ge=1, le=MAX_BINS, description="evenly spaced times from 0 to one period")
     ] = None,
     y: Annotated[
         int | None, Query(ge=0, description="row of a streak; the middle one without it")
@@ -237,11 +236,7 @@ async def pixel_answer(
 def invalid(field: str, value: object, limit: str) -> Problem:
     """Return the problem of a value that cannot be used."""
     return Problem(
-        kinds.INVALID_REQUEST,
-        f"{field} must be {limit}.",
-        field=field,
-        value=value,
-        limit=limit,
+        kinds.INVALID_REQUEST, f"{field} must be {limit}.", field=field, value=value, limit=limit
     )
 
 

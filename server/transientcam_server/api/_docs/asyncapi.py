@@ -59,7 +59,7 @@ def asyncapi(*, version: str, host: str, secure: bool, root_path: str = "") -> d
                                     "type": "string",
                                     "const": wire.SUBPROTOCOL,
                                 }
-                            },
+                            }
                         ),
                         "bindingVersion": "0.1.0",
                     }

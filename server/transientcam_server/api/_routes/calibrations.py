@@ -78,12 +78,7 @@ async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
     "/calibrations",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Measure a calibration",
-    responses=ACCEPTED
-    | documented(
-        kinds.CAMERA_BUSY,
-        kinds.RECORDING_RUNS,
-        kinds.TOO_MANY_JOBS,
-    ),
+    responses=ACCEPTED | documented(kinds.CAMERA_BUSY, kinds.RECORDING_RUNS, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.OPERATOR, lease=True, light=True)
 async def measure_calibration(
@@ -157,11 +152,7 @@ async def restore_calibration(service: ServiceOf) -> ActiveDocument:
     status_code=status.HTTP_201_CREATED,
     summary="Take a calibration in",
     openapi_extra=_FILE,
-    responses=documented(
-        kinds.TOO_LARGE,
-        kinds.INVALID_CALIBRATION,
-        kinds.CALIBRATION_NOT_STORED,
-    ),
+    responses=documented(kinds.TOO_LARGE, kinds.INVALID_CALIBRATION, kinds.CALIBRATION_NOT_STORED),
 )
 @needs(Role.OPERATOR, lease=False)  # no frame is calibrated by it yet
 async def import_calibration(service: ServiceOf, request: Request) -> CalibrationDocument:
@@ -198,9 +189,7 @@ async def read_calibration(service: ServiceOf, calibration: _Calibration) -> Cal
     "/calibrations/{calibration}",
     summary="Delete a calibration",
     responses=documented(
-        kinds.UNKNOWN_CALIBRATION,
-        kinds.CALIBRATION_IN_USE,
-        kinds.CALIBRATION_NOT_STORED,
+        kinds.UNKNOWN_CALIBRATION, kinds.CALIBRATION_IN_USE, kinds.CALIBRATION_NOT_STORED
     ),
 )
 @needs(Role.ADMIN, lease=False)

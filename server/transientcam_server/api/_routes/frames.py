@@ -89,12 +89,7 @@ add_frame_routes(
     router,
     _chosen,
     path="/frames/{frame}",
-    missing=(
-        kinds.UNKNOWN_FRAME,
-        kinds.FRAME_GONE,
-        kinds.NO_FRAME_YET,
-        kinds.SHUTTING_DOWN,
-    ),
+    missing=(kinds.UNKNOWN_FRAME, kinds.FRAME_GONE, kinds.NO_FRAME_YET, kinds.SHUTTING_DOWN),
     frame=("A frame", "Return what is known of the latest frame, or of one of the last seconds."),
     pixel="one pixel",
     product=("A product of a frame", _PRODUCT),

@@ -49,11 +49,7 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
         ],
         estimators=[_estimator(*each) for each in comparisons.PLUGINS.statements().items()],
         caller=InfoDocument.CallerDocument.model_validate(
-            {
-                "name": principal.name,
-                "role": str(principal.role),
-                "may_light": principal.may_light,
-            }
+            {"name": principal.name, "role": str(principal.role), "may_light": principal.may_light}
         ),
         history=HistoryDocument.model_validate(service.history),
         clients=service.hub.clients,

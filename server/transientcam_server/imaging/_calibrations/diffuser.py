@@ -17,11 +17,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import CalibrationCapture
 from transientcam_server.imaging._calibrations.verdict import Finding, Verdict, word_of
-from transientcam_server.imaging._recipe.calibration import (
-    NOMINAL_ID,
-    Calibration,
-    nominal_gains,
-)
+from transientcam_server.imaging._recipe.calibration import NOMINAL_ID, Calibration, nominal_gains
 
 _Array = NDArray[Any]
 

@@ -18,11 +18,7 @@ from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_moments.plugins import CALLERS, PRODUCTS as OF_PACKAGES, MapProduct, mapped
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
-from transientcam_server.imaging._products.labelling import (
-    image_columns,
-    in_words,
-    moment_columns,
-)
+from transientcam_server.imaging._products.labelling import image_columns, in_words, moment_columns
 from transientcam_server.imaging._products.view import Crop, View
 from transientcam_server.imaging._recipe.recipe import Recipe
 

@@ -122,11 +122,7 @@ def _is_integer(value: object) -> bool:
 
 def _invalid(field: str, value: object, limit: str) -> Problem:
     return Problem(
-        kinds.INVALID_REQUEST,
-        f"{field} must be {limit}.",
-        field=field,
-        value=value,
-        limit=limit,
+        kinds.INVALID_REQUEST, f"{field} must be {limit}.", field=field, value=value, limit=limit
     )
 
 
