@@ -220,11 +220,6 @@ async def read_calibration_file(
     )
 
 
-def _harmonics(stored: StoredCalibration) -> HarmonicsDocument | None:
-    document = to_document(stored.waveform)
-    return None if document is None else HarmonicsDocument(**document)
-
-
 async def _receive(request: Request, part: FilePath, *, limit: int) -> None:
     received, waiting = 0, bytearray()
     with part.open("wb") as file:
@@ -249,7 +244,7 @@ def _active(service: Service) -> ActiveDocument:
 def _document(
     service: Service, stored: StoredCalibration, drift: Drift | None
 ) -> CalibrationDocument:
-    subject = stored.subject
+    subject, waveform = stored.subject, to_document(stored.waveform)
     misfit = service.calibrations.misfit(stored, service.applied)
     active = stored.id == service.calibrations.active_id
     return CalibrationDocument(
@@ -269,6 +264,6 @@ def _document(
         active=active,
         verdict=VerdictDocument.model_validate(stored.verdict.to_document()),
         forced=stored.notes.get("forced") is True,
-        harmonics=_harmonics(stored),
+        harmonics=None if waveform is None else HarmonicsDocument(**waveform),
         drift=DriftDocument.model_validate(drift) if active and drift else None,
     )

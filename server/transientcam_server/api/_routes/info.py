@@ -30,11 +30,9 @@ async def read_versions(service: ServiceOf) -> VersionsDocument:
 @router.get("/info", summary="The service")
 async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
     """Return what this service is, which products its frames have, and what the caller may do."""
+    device = tm.kernels.device_state()
     return InfoDocument(
-        name=service.identity["name"],
-        version=service.identity["version"],
-        service_id=service.identity["service_id"],
-        path=service.identity["path"],
+        **service.identity,
         api="v1",
         stream=InfoDocument.StreamDocument(
             path=f"{service.settings.root_path}/api/v1/stream",
@@ -54,14 +52,9 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
         history=HistoryDocument.model_validate(service.history),
         clients=service.hub.clients,
         kernels=_kernels(service.pipeline.recipe_of(service.applied)),
-        device=_device(),
+        device=None if device is None else InfoDocument.DeviceDocument.model_validate(device),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),
     )
-
-
-def _device() -> InfoDocument.DeviceDocument | None:
-    state = tm.kernels.device_state()
-    return None if state is None else InfoDocument.DeviceDocument.model_validate(state)
 
 
 def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
