@@ -7,9 +7,9 @@ from fastapi import APIRouter, Query
 
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.frame import HistoryDocument
-from transientcam_server.api._frame_query import LATEST, MAX_NUMBER, FrameName, invalid
+from transientcam_server.api._frame_query import LATEST, MAX_NUMBER, FrameName
 from transientcam_server.api._frame_routes import add_frame_routes
-from transientcam_server.errors import kinds
+from transientcam_server.errors import invalid, kinds
 from transientcam_server.imaging import Frame, Pipeline
 from transientcam_server.service import Service
 
