@@ -380,7 +380,6 @@ def require_plain(document: Mapping[str, Any]) -> None:
 
 
 def _finite(name: str, *values: float) -> float:
-    """Return the first value."""
     for value in values:
         if not math.isfinite(value):
             raise ValueError(f"{name} is {value}")
