@@ -164,7 +164,8 @@ def calibrate(
     if as_json:
         echo(json.dumps(result, indent=2))
     elif url is None:
-        _print_capture(result)
+        head, count = f"{result['file']}: {result['calibration_id']}", result["takes"]
+        echo("\n".join(_lines(head, result, result, result, count * result["images"])))
     else:
         _print_measured(result)
     verdict = result["verdict"] if url is None else result["measured"]["verdict"]
@@ -365,11 +366,6 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
         "bad_pixels": measured.gains.bad_pixels,
         "sequence": capture.sequence.to_document(),
     }
-
-
-def _print_capture(result: dict[str, Any]) -> None:
-    head, captured = f"{result['file']}: {result['calibration_id']}", result["takes"]
-    echo("\n".join(_lines(head, result, result, result, captured * result["images"])))
 
 
 def _lines(
