@@ -27,11 +27,7 @@ from transientcam.requests import (
     recording_path,
 )
 from transientcam.stream import BaseStream
-from transientcam.stream_state import (
-    DEFAULT_CREDITS,
-    StreamState,
-    subscribe_message,
-)
+from transientcam.stream_state import DEFAULT_CREDITS, StreamState, subscribe_message
 from transientcam.transport import (
     Deadline,
     DownloadProgress,

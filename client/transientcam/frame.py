@@ -110,6 +110,13 @@ class Frame:
         return f"{finite.min():.4g} to {finite.max():.4g} {self.unit}{gaps}"
 
 
+def npy_bytes(frame: Frame) -> bytes:
+    """Return the array of a frame as an .npy file."""
+    file = io.BytesIO()
+    np.save(file, frame.array, allow_pickle=False)
+    return file.getvalue()
+
+
 def npz_bytes(frame: Frame) -> bytes:
     """Return a frame and its metadata as an .npz file, which `numpy.load` reads.
 

@@ -157,8 +157,7 @@ class Stream(BaseStream):
         with translated(self._url):
             connection: ClientConnection = self._stack.enter_context(
                 connect(
-                    self._url,
-                    **stream_options(self._url, timeout_s=self._timeout_s, threaded=True),
+                    self._url, **stream_options(self._url, timeout_s=self._timeout_s, threaded=True)
                 )
             )
             require_direct(connection, self._url)

@@ -31,7 +31,8 @@ invalid text, and a stream that was refused."""
 def configure(*, level: str, form: LogFormat, stream: TextIO = sys.stderr) -> None:
     """Log to ``stream``, one line a message."""
     handler = logging.StreamHandler(stream)
-    handler.setFormatter(formatter(form if form != "auto" else _form_for(stream)))
+    chosen = form if form != "auto" else "text" if stream.isatty() else "json"
+    handler.setFormatter(formatter(chosen))
     handler.addFilter(_add_request_id)
     handler.addFilter(_as_client_mistake)
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
@@ -49,10 +50,6 @@ def formatter(form: Literal["text", "json"]) -> logging.Formatter:
         rename_fields={"levelname": "level", "name": "logger", "exc_info": "exception"},
         timestamp="time",
     )
-
-
-def _form_for(stream: TextIO) -> Literal["text", "json"]:
-    return "text" if stream.isatty() else "json"
 
 
 def _add_request_id(record: logging.LogRecord) -> bool:

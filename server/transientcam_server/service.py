@@ -27,7 +27,6 @@ from transientcam_server.camera import (
     Dark,
     Darkness,
     Event,
-    Job,
     Jobs,
     Lease,
     LeaseManager,
@@ -162,11 +161,7 @@ class Service:
         simulated = camera.simulation is not None
         twin = partial(snapshot_of, camera, settings.camera) if simulated else None
         self.looks = Looks(
-            self.planner,
-            self.workers,
-            self.planning,
-            twin,
-            calibrated_c=self._calibrated_c,
+            self.planner, self.workers, self.planning, twin, calibrated_c=self._calibrated_c
         )
         self.fronts = FrontCache(
             self.planner, self.workers, self.planning, self.looks, simulated=simulated
@@ -197,7 +192,9 @@ class Service:
             None if self.relay is None else OriginLease(self.relay, self.acquisition)
         )
         self.applied: AppliedSequence = camera.applied
-        self.jobs = Jobs(report=self._job_changed)
+        self.jobs = Jobs(
+            report=lambda job: self.hub.notify("job-changed", {"job": job.to_document()})
+        )
         self.calibrations = Calibrator(
             camera,
             kept,
@@ -579,9 +576,6 @@ class Service:
             stopping.add_done_callback(_log_failure)
         if self.origin_lease is not None and change != "granted":
             self.origin_lease.release()  # behind the stop above; a new holder takes it anew
-
-    def _job_changed(self, job: Job) -> None:
-        self.hub.notify("job-changed", {"job": job.to_document()})
 
     def _notify_sequence_changed(self) -> None:
         sequence = self.applied.to_document()

@@ -18,8 +18,7 @@ def capture(
     url: UrlArgument,
     product: ProductArgument,
     output: Annotated[
-        Path,
-        typer.Option("--output", "-o", help="File to write; - is standard output."),
+        Path, typer.Option("--output", "-o", help="File to write; - is standard output.")
     ],
     number: Annotated[
         int | None, typer.Option(min=1, help="Number of the frame; default: the newest.")

@@ -3,7 +3,7 @@
 import json
 import ssl
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from email.utils import parsedate_to_datetime
 from importlib.metadata import version
@@ -100,11 +100,7 @@ def _versions(found: dict[str, Any]) -> Finding:
 
 def _ready(http: httpx.Client, base: str, *, timeout_s: float) -> Finding:
     try:
-        with (
-            translated(base),
-            within(timeout_s),
-            http.stream("GET", f"{base}/readyz") as response,
-        ):
+        with translated(base), within(timeout_s), http.stream("GET", f"{base}/readyz") as response:
             body = read(response, most_bytes=MOST_DOCUMENT_BYTES).body
     except TransientcamError as error:
         return Finding("fault", "ready", str(error), "look into the daemon's log")
@@ -151,21 +147,15 @@ def _camera(camera: Camera, seconds: float) -> Iterator[Finding]:
     active = camera.calibrations.active()
     if (warning := active.get("warning")) is not None:
         yield Finding("warning", "calibration", str(warning), "transientcam calibrate")
-    yield from _products(camera.info)
+    if (absent := camera.info.get("absent_products")) is not None:  # older daemons do not say
+        for message in absent_in_words({each["name"]: each["reason"] for each in absent}):
+            yield Finding("ok", "products", message)
     if not camera.acquisition["running"]:
         message = "the capture is stopped, so nothing can be measured"
         remedy = 'PUT /api/v1/acquisition {"running": true} starts it'
         yield Finding("warning", "stream", message, remedy)
         return
     yield _stream(camera, seconds)
-
-
-def _products(info: Mapping[str, Any]) -> Iterator[Finding]:
-    """List what this camera cannot give; older daemons do not say."""
-    if "absent_products" in info:
-        absent = {each["name"]: each["reason"] for each in info["absent_products"]}
-        for message in absent_in_words(absent):
-            yield Finding("ok", "products", message)
 
 
 def _stream(camera: Camera, seconds: float) -> Finding:

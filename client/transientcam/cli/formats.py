@@ -1,6 +1,5 @@
 """A frame as the bytes of a file."""
 
-import io
 import json
 from collections.abc import Callable
 from enum import StrEnum
@@ -9,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam.frame import Frame, npz_bytes
+from transientcam.frame import Frame, npy_bytes, npz_bytes
 from transientcam.wire import encode_frame
 
 
@@ -41,12 +40,6 @@ MADE_BY_DAEMON: Final = frozenset((Format.PNG, Format.TIFF, Format.PLY, Format.C
 def frame_bytes(frame: Frame, form: Format) -> bytes:
     """Return ``frame`` in any format but those of `MADE_BY_DAEMON`."""
     return _WRITERS[form](frame)
-
-
-def _npy(frame: Frame) -> bytes:
-    file = io.BytesIO()
-    np.save(file, frame.array, allow_pickle=False)
-    return file.getvalue()
 
 
 def _msgpack(frame: Frame) -> bytes:
@@ -82,7 +75,7 @@ def _nested(array: NDArray[Any]) -> Any:
 
 
 _WRITERS: dict[Format, Callable[[Frame], bytes]] = {
-    Format.NPY: _npy,
+    Format.NPY: npy_bytes,
     Format.NPZ: npz_bytes,
     Format.MSGPACK: _msgpack,
     Format.JSON: _json,

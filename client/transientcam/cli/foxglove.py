@@ -22,16 +22,14 @@ def foxglove(
         ),
     ] = None,
     host: Annotated[
-        str,
-        typer.Option(help="Where to serve viewers; whoever knows the address sees the frames."),
+        str, typer.Option(help="Where to serve viewers; whoever knows the address sees the frames.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 for any that is free.")] = 8765,
     max_rate_hz: Annotated[
         float, typer.Option(min=0.01, help="Maximum frames per second shown.")
     ] = 10.0,
     control: Annotated[
-        bool,
-        typer.Option("--control", help="Let viewers set parameters, and stop the camera."),
+        bool, typer.Option("--control", help="Let viewers set parameters, and stop the camera.")
     ] = False,
     control_light: Annotated[
         bool,

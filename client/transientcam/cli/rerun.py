@@ -21,8 +21,7 @@ _HERE: Final = "rerun+http://127.0.0.1:9876/proxy"
 def rerun(
     url: UrlArgument,
     products: Annotated[
-        list[str] | None,
-        typer.Argument(help=f"Products to send; default: {', '.join(LOGGED)}."),
+        list[str] | None, typer.Argument(help=f"Products to send; default: {', '.join(LOGGED)}.")
     ] = None,
     spawn: Annotated[
         bool,

@@ -3,10 +3,7 @@
 A `Request` holds what to send and how to read the `Answer`; `Camera` and `AsyncCamera` send it.
 """
 
-from transientcam.requests import (
-    _frames as frames,
-    _planning as planning,
-)
+from transientcam.requests import _frames as frames, _planning as planning
 from transientcam.requests._calibrations import Calibrations
 from transientcam.requests._frames import Part, Which
 from transientcam.requests._jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended

@@ -9,7 +9,7 @@ from transientcam.requests._request import Request, document, file, upload
 _BINARY: Final = "application/octet-stream"
 _Document = TypeVar("_Document")
 _Bytes = TypeVar("_Bytes")
-_EXTRA_TIMEOUT_S: Final = 60.0
+_EXTRA_S: Final = 60.0
 """How much longer than usual it takes to send or evaluate a file that may be large."""
 
 
@@ -74,15 +74,13 @@ class Calibrations(Generic[_Document, _Bytes]):
         """
         body = {"id": calibration_id, "force": force}
         return self._ask(
-            document(
-                "calibrations/active", method="PUT", body=body, extra_timeout_s=_EXTRA_TIMEOUT_S
-            )
+            document("calibrations/active", method="PUT", body=body, extra_timeout_s=_EXTRA_S)
         )
 
     def undo(self) -> _Document:
         """Use the one again that was active before the present one, ``former`` of `active`."""
         return self._ask(
-            document("calibrations/active/undo", method="POST", extra_timeout_s=_EXTRA_TIMEOUT_S)
+            document("calibrations/active/undo", method="POST", extra_timeout_s=_EXTRA_S)
         )
 
     def export(self, calibration_id: str) -> _Bytes:
@@ -92,9 +90,7 @@ class Calibrations(Generic[_Document, _Bytes]):
     def take_in(self, content: bytes) -> _Document:
         """Import a file that was exported, and return its description."""
         return self._ask(
-            upload(
-                "calibrations/import", content, media_type=_BINARY, extra_timeout_s=_EXTRA_TIMEOUT_S
-            )
+            upload("calibrations/import", content, media_type=_BINARY, extra_timeout_s=_EXTRA_S)
         )
 
     def delete(self, calibration_id: str) -> _Document:

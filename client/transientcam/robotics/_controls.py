@@ -59,8 +59,10 @@ class Controls:
             self._check(name, value, known)
         changed: dict[str, dict[str, Any]] = {}
         for name, value in values.items():
+            whole = isinstance(value, float) and value.is_integer()
             changed.setdefault(_document_of(known[name]), {})[known[name]["pointer"]] = (
-                int(value) if known[name]["type"] == "integer" and _is_whole(value) else value
+                # viewers have one type of numbers
+                int(value) if known[name]["type"] == "integer" and whole else value
             )
         # what was changed stays, also if this program ends just then
         with self._one_at_a_time, self._camera.lease(self._holder, on_lapse="keep"):
@@ -133,8 +135,3 @@ class Controls:
 
 def _document_of(parameter: Mapping[str, Any]) -> str:
     return str(parameter["resource"]).rpartition("/")[2]
-
-
-def _is_whole(value: Any) -> bool:
-    # viewers have one type of numbers
-    return isinstance(value, float) and value.is_integer()

@@ -107,7 +107,7 @@ class FoxgloveBridge:
         self._source = Source(
             camera,
             on_report=on_report,
-            publish=self._publish,
+            publish=lambda each: self._server.publish_status(each.text, each.level, each.about),
             on_notice=self._noticed,
             now_ns=now_ns,
         )
@@ -196,6 +196,3 @@ class FoxgloveBridge:
     def _noticed(self, notice: Notice) -> None:
         if notice.kind in _PARAMETERS_CHANGE:
             self._server.publish_parameters(self._watching.parameters())
-
-    def _publish(self, report: Report) -> None:
-        self._server.publish_status(report.text, report.level, report.about)

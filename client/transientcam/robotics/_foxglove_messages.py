@@ -93,9 +93,7 @@ def _points(message: Points, stamp: Timestamp) -> PointCloud:
         point_stride=len(message.fields) * _FLOAT_BYTES,
         fields=[
             PackedElementField(
-                name=name,
-                offset=index * _FLOAT_BYTES,
-                type=PackedElementFieldNumericType.Float32,
+                name=name, offset=index * _FLOAT_BYTES, type=PackedElementFieldNumericType.Float32
             )
             for index, name in enumerate(message.fields)
         ],

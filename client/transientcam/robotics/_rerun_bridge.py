@@ -107,9 +107,7 @@ def log_transient(recording: rr.RecordingStream, coefficients: Frame, bins: int)
     time_s = np.arange(bins) / (bins * base_frequency_hz)
     light = transient(coefficients.array, time_s, base_frequency_hz=base_frequency_hz)
     recording.log(
-        TRANSIENT,
-        rr.Tensor(light, dim_names=("time", "y", "x")),
-        rr.AnyValues(time_s=time_s),
+        TRANSIENT, rr.Tensor(light, dim_names=("time", "y", "x")), rr.AnyValues(time_s=time_s)
     )
 
 

@@ -54,9 +54,7 @@ NOTICES: Final[dict[str, NoticeKind]] = {
             {"because": "string", "reason": "string"},
         ),
         NoticeKind(
-            "light-unconfirmed",
-            "the light was to go off and may be on",
-            {"reason": "string"},
+            "light-unconfirmed", "the light was to go off and may be on", {"reason": "string"}
         ),
         NoticeKind("light-confirmed", "that has ended: it is off, or was started again"),
         NoticeKind(
@@ -71,9 +69,7 @@ NOTICES: Final[dict[str, NoticeKind]] = {
             {"count": "integer", "total": "integer"},
         ),
         NoticeKind(
-            "disk-stalled",
-            "the disk of the recordings does not answer",
-            {"recording": "string"},
+            "disk-stalled", "the disk of the recordings does not answer", {"recording": "string"}
         ),
         NoticeKind(
             "recording-stopped",

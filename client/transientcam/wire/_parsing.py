@@ -35,20 +35,8 @@ MAX_INTEGER: Final = 2**53 - 1
 """Frame numbers and counts stay exact in the browser's numbers."""
 _MAX_CHANNELS = 64
 _FRAME_KEYS = frozenset(
-    (
-        "v",
-        "type",
-        "channel",
-        "product",
-        "unit",
-        "axes",
-        "meta",
-        "encode_s",
-        "pad",
-        "array",
-        "brightness",
-    )
-)
+    ("v", "type", "channel", "product", "unit", "axes", "meta", "encode_s", "pad", "array")
+) | {"brightness"}
 
 
 def parse_client_message(data: bytes | bytearray | memoryview | str) -> ClientMessage:

@@ -21,8 +21,7 @@ _RANGES: Final = re.compile(
     r"bytes=\s*({0}-{0}?|-{0})(\s*,\s*({0}-{0}?|-{0}))*\s*".replace("{0}", r"(\d{1,18})"), re.ASCII
 )
 Range = Annotated[
-    str | None,
-    Header(alias="range", description="which bytes, to go on with a broken download"),
+    str | None, Header(alias="range", description="which bytes, to go on with a broken download")
 ]
 
 

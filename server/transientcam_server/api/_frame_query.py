@@ -13,7 +13,7 @@ from pydantic import FiniteFloat
 from transientcam_server.api._middleware.answers import expect_bytes
 from transientcam_server.api._middleware.requests import asks_for_head
 from transientcam_server.api._negotiation import negotiate
-from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors import invalid, kinds
 from transientcam_server.imaging import (
     COLOUR_PNG,
     DEFAULT_BINS,
@@ -87,7 +87,9 @@ class FrameQuery:
         self._require_meaning(product)
         height, width = frame.shape
         crop = Crop.parse(self.region, self.decimation, height=height, width=width)
-        times_s = self._times_s(frame) if product.over_time else ()
+        times_s = tuple(self.time_s or ())
+        if product.over_time and self.time_s is None:
+            times_s = evenly(frame.recipe.base_frequency_hz, self.bins or DEFAULT_BINS)
         y = self._row(crop, height) if product.of_row else None
         return View(times_s, crop, y)
 
@@ -100,11 +102,6 @@ class FrameQuery:
             raise invalid("bins", self.bins, "left out where time_s is given")
         if self.y is not None and not product.of_row:
             raise invalid("y", self.y, "left out: this product has more than one row")
-
-    def _times_s(self, frame: Frame) -> tuple[float, ...]:
-        if self.time_s is not None:
-            return tuple(self.time_s)
-        return evenly(frame.recipe.base_frequency_hz, self.bins or DEFAULT_BINS)
 
     def _row(self, crop: Crop, height: int) -> int:
         _, first, _, rows = crop.region or (0, 0, 0, height)
@@ -123,8 +120,7 @@ async def _frame_query(
         Query(max_length=MAX_BINS, description="times of flight in seconds; may be repeated"),
     ] = None,
     bins: Annotated[
-        int | None,
-        Query(ge=1, le=MAX_BINS, description="evenly spaced times from 0 to one period"),
+        int | None, Query(ge=1, le=MAX_BINS, description="evenly spaced times from 0 to one period")
     ] = None,
     y: Annotated[
         int | None, Query(ge=0, description="row of a streak; the middle one without it")
@@ -196,10 +192,11 @@ def _headers(product: Product, encoding: Encoding, view: View, frame: Frame) -> 
     """Return the headers of a product that has been computed, with what is known of its frame."""
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
     if encoding is not MSGPACK:  # which holds it
-        meta = view.crop.with_meta(frame.meta())
+        meta, steps = view.crop.with_meta(frame.meta()), product.png_steps
+        unit = steps.unit if steps is not None and encoding is PNG else product.description.unit
         headers |= {
             "Transientcam-Frame": str(frame.number),
-            "Transientcam-Unit": _unit(product, encoding),
+            "Transientcam-Unit": unit,
             "Transientcam-Meta": json.dumps(meta, separators=(",", ":")),
         }
     return headers
@@ -216,11 +213,6 @@ async def _one_after_another(
         head = b""
 
 
-def _unit(product: Product, encoding: Encoding) -> str:
-    steps = product.png_steps if encoding is PNG else None
-    return product.description.unit if steps is None else steps.unit
-
-
 async def pixel_answer(
     frame: Frame, x: int, y: int, bins: int, *, simulated: bool = False, as_csv: bool = False
 ) -> Response:
@@ -232,17 +224,6 @@ async def pixel_answer(
     body = await frame.with_moments(pixel_csv if as_csv else pixel_json, truth, x, y, bins)
     media_type = "text/csv" if as_csv else "application/json"
     return Response(body, media_type=media_type, headers={"Cache-Control": "no-store"})
-
-
-def invalid(field: str, value: object, limit: str) -> Problem:
-    """Return the problem of a value that cannot be used."""
-    return Problem(
-        kinds.INVALID_REQUEST,
-        f"{field} must be {limit}.",
-        field=field,
-        value=value,
-        limit=limit,
-    )
 
 
 _BINARY: Final[dict[str, Any]] = {"schema": {"type": "string", "format": "binary"}}

@@ -67,12 +67,7 @@ def add_frame_routes(
     """
     chosen_of = Depends(chosen_by)
 
-    @router.get(
-        path,
-        summary=frame[0],
-        description=frame[1],
-        responses=documented(*missing),
-    )
+    @router.get(path, summary=frame[0], description=frame[1], responses=documented(*missing))
     async def read_frame(
         chosen: ChosenFrame = chosen_of, *, computed: _Computed = False
     ) -> FrameDocument:

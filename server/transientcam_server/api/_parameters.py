@@ -18,20 +18,9 @@ from transientcam_server.api._documents.parameters import Access, ParameterDocum
 from transientcam_server.api._documents.sequence import SequenceDocument, SubPhasesDocument
 from transientcam_server.errors import Problem
 from transientcam_server.imaging import require_estimator
-from transientcam_server.settings import (
-    HistorySettings,
-    ReconstructionSettings,
-    RecordingSettings,
-)
+from transientcam_server.settings import HistorySettings, ReconstructionSettings, RecordingSettings
 
-_UNITS: Final = {
-    "_hz": "Hz",
-    "_s": "s",
-    "seconds": "s",
-    "_px": "px",
-    "_dn": "DN",
-    "bytes": "B",
-}
+_UNITS: Final = {"_hz": "Hz", "_s": "s", "seconds": "s", "_px": "px", "_dn": "DN", "bytes": "B"}
 
 
 def of_sequence(

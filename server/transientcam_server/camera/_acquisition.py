@@ -233,6 +233,7 @@ class Acquisition:
         if len(arrivals_s) > 1 and arrivals_s[-1] > arrivals_s[0]:
             rate_hz = (len(arrivals_s) - 1) / (arrivals_s[-1] - arrivals_s[0])
         age_s = self._clock() - self._moved_s
+        stalled_s = max(STALLED_MIN_S, STALLED_PERIODS / self._camera.applied.frame_rate_hz)
         state, darkness = self._state(), self._darkness
         dark = None if state in ("arming", "calibrating") else self._dark
         return AcquisitionStatus(
@@ -242,7 +243,7 @@ class Acquisition:
             frames=self._frames,
             frame_age_s=age_s,
             reason=self._lost or (None if dark is None else str(dark)),
-            stalled=state in ("starting", "streaming") and age_s > self._stall_after_s(),
+            stalled=state in ("starting", "streaming") and age_s > stalled_s,
             light_on_in_s=self._announcement.light_on_in_s,
             off_because=None if dark is None else dark.cause,
             off_kept=None if dark is None or darkness is None else darkness.written.done(),
@@ -259,10 +260,6 @@ class Acquisition:
         if not self._running:
             return "stopped"
         return "streaming" if self._started else "starting"
-
-    def _stall_after_s(self) -> float:
-        applied = self._camera.applied
-        return max(STALLED_MIN_S, STALLED_PERIODS / applied.frame_rate_hz)
 
     # -- on the thread -------------------------------------------------------------------------
 
@@ -281,7 +278,8 @@ class Acquisition:
                 # no failure with one frame may end the acquisition
                 _log.exception("the acquisition failed and is continued")
                 self._run_commands(wait_s=BACKOFF_S[-1])
-        self._shut_down()
+        self._run_commands(wait_s=0.0)
+        self._switch_off_at_end()
 
     def _beat(self) -> None:
         """Tell the supervisor that the light is under control, and hear what it has done."""
@@ -559,10 +557,6 @@ class Acquisition:
                 command = self._commands.get_nowait()
         except queue.Empty:
             return
-
-    def _shut_down(self) -> None:
-        self._run_commands(wait_s=0.0)
-        self._switch_off_at_end()
 
     def _switch_off_at_end(self) -> None:
         dark = True

@@ -180,7 +180,8 @@ class Calibrator:
         calibration = None
         if new_id != NOMINAL_ID:
             stored = await asyncio.to_thread(self.store.get, new_id)
-            self._require_fit(self.misfit(stored, applied()))
+            if (misfit := self.misfit(stored, applied())) is not None:
+                raise misfit
             if not (force or stored.usable):
                 raise doubted(stored.verdict)
             loaded, _ = await self._pipeline.workers.run_long(load_calibration, stored.path)
@@ -334,7 +335,9 @@ class Calibrator:
                     shares.append(share)
         if not shares:
             return None
-        return Drift(min(shares), _share_in(calibration.capture.notes), last)
+        noted: Any = calibration.capture.notes.get("invalid_share")  # anything, in imported files
+        known = isinstance(noted, int | float) and 0 <= noted <= 1
+        return Drift(min(shares), float(noted) if known else None, last)
 
     async def _share_of(self, frame: Frame) -> float | None:
         try:
@@ -364,16 +367,6 @@ class Calibrator:
             if (share := contradictory_share(recipe, found)) is not None:
                 shares.append(share)
         return min(shares, default=None)
-
-    def _require_fit(self, misfit: CalibrationMismatch | None) -> None:
-        if misfit is not None:
-            raise misfit
-
-
-def _share_in(notes: Mapping[str, Any]) -> float | None:
-    """Return the share in the notes, which an imported file may fill with anything."""
-    share = notes.get("invalid_share")
-    return float(share) if isinstance(share, int | float) and 0 <= share <= 1 else None
 
 
 class _Takes:

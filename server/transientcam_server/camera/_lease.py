@@ -151,8 +151,8 @@ class LeaseManager:
         self._forget()
 
     def _require_current(self, lease_id: str | None) -> Lease:
-        lease = self.current
-        if lease is not None and secrets.compare_digest(lease.id.encode(), _bytes(lease_id)):
+        lease, given = self.current, (lease_id or "").encode("utf-8", "surrogateescape")
+        if lease is not None and secrets.compare_digest(lease.id.encode(), given):
             return lease
         if lease is not None:
             raise Problem(
@@ -207,7 +207,3 @@ class LeaseManager:
         self._expire()
         if self._lease is not None:  # the timer runs by another clock and may be early
             self._timer = self._call_later(self.remaining_s(self._lease), self._timer_fired)
-
-
-def _bytes(text: str | None) -> bytes:
-    return b"" if text is None else text.encode("utf-8", "surrogateescape")

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 def calibrate(
     url: Annotated[
-        str | None,
-        typer.Argument(metavar="[URL]", help="Daemon whose camera is calibrated."),
+        str | None, typer.Argument(metavar="[URL]", help="Daemon whose camera is calibrated.")
     ] = None,
     output: Annotated[
         Path | None,
@@ -33,8 +32,7 @@ def calibrate(
         ),
     ] = None,
     camera: Annotated[
-        str | None,
-        typer.Option(help="Without a daemon: usb[:SERIAL] or sim:SCENE  [default: usb]"),
+        str | None, typer.Option(help="Without a daemon: usb[:SERIAL] or sim:SCENE  [default: usb]")
     ] = None,
     takes: Annotated[int, typer.Option(min=2, max=10_000, help="Captures of each image.")] = 40,
     sequence: Annotated[
@@ -49,8 +47,7 @@ def calibrate(
         bool, typer.Option("--activate", help="Use it in the daemon at once.")
     ] = False,
     force: Annotated[
-        bool,
-        typer.Option("--force", help="Use it even if it was not measured on a diffuser."),
+        bool, typer.Option("--force", help="Use it even if it was not measured on a diffuser.")
     ] = False,
     diffuser: Annotated[
         bool,
@@ -61,8 +58,7 @@ def calibrate(
         ),
     ] = False,
     harmonics: Annotated[
-        bool,
-        typer.Option(help="Measure the harmonics of the modulation, by a phase sweep."),
+        bool, typer.Option(help="Measure the harmonics of the modulation, by a phase sweep.")
     ] = True,
     undo: Annotated[
         bool,
@@ -168,7 +164,8 @@ def calibrate(
     if as_json:
         echo(json.dumps(result, indent=2))
     elif url is None:
-        _print_capture(result)
+        head, count = f"{result['file']}: {result['calibration_id']}", result["takes"]
+        echo("\n".join(_lines(head, result, result, result, count * result["images"])))
     else:
         _print_measured(result)
     verdict = result["verdict"] if url is None else result["measured"]["verdict"]
@@ -369,11 +366,6 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
         "bad_pixels": measured.gains.bad_pixels,
         "sequence": capture.sequence.to_document(),
     }
-
-
-def _print_capture(result: dict[str, Any]) -> None:
-    head, captured = f"{result['file']}: {result['calibration_id']}", result["takes"]
-    echo("\n".join(_lines(head, result, result, result, captured * result["images"])))
 
 
 def _lines(

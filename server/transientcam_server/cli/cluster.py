@@ -10,8 +10,7 @@ from transientcam.cli.terminal import Terminal
 from transientcam_server.errors import ClusterError, MissingExtra
 
 WorkersOption = Annotated[
-    int | None,
-    typer.Option(min=1, help="Compute with so many processes of this machine."),
+    int | None, typer.Option(min=1, help="Compute with so many processes of this machine.")
 ]
 DaskOption = Annotated[
     str | None,

@@ -93,8 +93,7 @@ def plan(
         ),
     ] = None,
     front: Annotated[
-        bool,
-        typer.Option("--front", help="Return the whole Pareto front instead of one sequence."),
+        bool, typer.Option("--front", help="Return the whole Pareto front instead of one sequence.")
     ] = False,
     real_time: Annotated[
         bool, typer.Option("--real-time", help="Let a simulated camera take its time, too.")

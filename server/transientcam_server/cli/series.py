@@ -66,8 +66,9 @@ def series(
         echo(json.dumps(job["result"] | {"job": job["id"]}))
         return
     for row in rows:
-        given = {name: value for name, value in row.items() if value is not None}
-        echo(", ".join(f"{name} {_short(value)}" for name, value in given.items()))
+        given = {name: each for name, each in row.items() if each is not None}
+        shown = [f"{each:.4g}" if isinstance(each, float) else each for each in given.values()]
+        echo(", ".join(map("{} {}".format, given, shown)))
     echo(f"in the page: {camera.url}/#view=series&series={job['id']}", err=True)
 
 
@@ -80,7 +81,3 @@ def _numbers(option: str, text: str | None, field: str) -> list[dict[str, Any]]:
         return [{field: scale * read(each)} for each in text.split(",")]
     except ValueError as error:
         raise typer.BadParameter(f"{text!r}: must be numbers, as 3,4", param_hint=option) from error
-
-
-def _short(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -117,10 +117,7 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
     configure_logging(settings)
     tm.kernels.use_device(settings.device)
     # the address first: if another daemon has it, the camera stays untouched
-    with (
-        exit_without_joining(),
-        listen(settings.host, settings.port) as listener,
-    ):
+    with exit_without_joining(), listen(settings.host, settings.port) as listener:
         url = address(listener, tls=settings.tls_certificate is not None)
         tell = iter([on_listening])
 

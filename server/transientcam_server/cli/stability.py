@@ -44,10 +44,7 @@ def stability(
 def _seen(url: str, most: int, token: str | None) -> Iterator[tuple[float, NDArray[Any]]]:
     from transientcam import Camera
 
-    with (
-        Camera(url, token=token) as camera,
-        camera.stream("range") as stream,
-    ):
+    with Camera(url, token=token) as camera, camera.stream("range") as stream:
         for frame in itertools.islice(stream, most):
             yield frame.meta["device_time_s"], frame.array
 

@@ -150,10 +150,7 @@ class Acceptor:
         )
         self._admission = Admission(limits, clock=self._loop.time)
         self._reserve = Reserve(
-            self._loop,
-            connect=self._connect_beyond,
-            refuse=self._refuse,
-            tls=tls is not None,
+            self._loop, connect=self._connect_beyond, refuse=self._refuse, tls=tls is not None
         )
         self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()

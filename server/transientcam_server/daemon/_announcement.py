@@ -74,8 +74,10 @@ async def announced(
 async def _announce(
     settings: Settings, capabilities: Capabilities, port: int, state: Callable[[], str]
 ) -> None:
+    everywhere = settings.host in _EVERYWHERE
+    interfaces = InterfaceChoice.All if everywhere else [_address(settings.host)]
     try:
-        network = AsyncZeroconf(interfaces=_interfaces(settings.host))
+        network = AsyncZeroconf(interfaces=interfaces)
     except OSError as error:
         _log.warning("the service is not announced: %s", error.strerror or error)
         return
@@ -144,10 +146,6 @@ def _cut(text: str, size_bytes: int) -> str:
 def _instance(name: str) -> str:
     """Return ``name`` as one label of a domain name."""
     return _cut(name.replace(".", "-"), _LABEL_BYTES)
-
-
-def _interfaces(host: str) -> list[str] | InterfaceChoice:
-    return InterfaceChoice.All if host in _EVERYWHERE else [_address(host)]
 
 
 def _addresses(host: str) -> list[str]:

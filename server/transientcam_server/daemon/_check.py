@@ -1,7 +1,7 @@
 """`transientcam serve --check`: what would be served, with which settings, from where."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -11,7 +11,6 @@ from transientcam_driver.camera import check_camera
 from transientcam_server.camera import NO_CAMERA, load_given
 from transientcam_server.daemon._configuration import Configuration
 from transientcam_server.errors import ServerError, SettingsError, SettingsMistake
-from transientcam_server.settings import Settings
 
 
 def require_usable(configuration: Configuration) -> None:
@@ -20,28 +19,22 @@ def require_usable(configuration: Configuration) -> None:
     Raises SettingsError naming what cannot be read and where it was named.
     """
     settings = configuration.settings
+    camera = None if settings.camera == NO_CAMERA else settings.camera
     mistakes = []
-    for name, value, read in (
-        ("camera", settings.camera, _check_camera),
-        ("calibration", settings.calibration, _read_calibration),
-    ):
+    named: tuple[tuple[str, Any, Callable[[Any], object]], ...] = (
+        ("camera", camera, check_camera),
+        ("calibration", settings.calibration, load_given),
+    )
+    for name, value, read in named:
+        if value is None:
+            continue
         try:
-            read(settings)
+            read(value)
         except (DriverError, ServerError, OSError) as error:
             place = configuration.places.of((name,))
             mistakes.append(SettingsMistake(place, str(value), str(error)))
     if mistakes:
         raise SettingsError(mistakes)
-
-
-def _check_camera(settings: Settings) -> None:
-    if settings.camera != NO_CAMERA:
-        check_camera(settings.camera)
-
-
-def _read_calibration(settings: Settings) -> None:
-    if settings.calibration is not None:
-        load_given(settings.calibration)
 
 
 def to_document(configuration: Configuration) -> dict[str, Any]:

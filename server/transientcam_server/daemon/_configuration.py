@@ -287,13 +287,9 @@ def _bad_certificate(settings: Settings, places: Places) -> Iterator[SettingsMis
         return
     try:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(settings.tls_certificate, settings.tls_key, password=_no_password)
+        # with a password ssl does not prompt for one, on a terminal that may not exist
+        context.load_cert_chain(settings.tls_certificate, settings.tls_key, password="")
     except OSError as error:  # what ssl raises is one, too
         reason = f"cannot be served: {error.strerror or error}"
         place = places.of(("tls_certificate",))
         yield SettingsMistake(place, str(settings.tls_certificate), reason)
-
-
-def _no_password() -> str:
-    """Keep ssl from prompting on a terminal that may not exist."""
-    return ""

@@ -69,10 +69,9 @@ def _libraries() -> Iterator[Reported]:
     for name in ("numba", "scipy", "h5py", "fastapi", "uvicorn"):
         try:
             import_module(name)
-        except (
-            Exception
-        ) as error:  # numba refuses a NumPy newer than it supports with its own error
-            # without numba everything works, only slower
+        except Exception as error:
+            # numba refuses a NumPy newer than it supports with its own error; without it
+            # everything works, only slower
             level = "warning" if name == "numba" else "fault"
             yield level, "packages", f"{name} cannot be imported: {error}", _REINSTALL
         else:

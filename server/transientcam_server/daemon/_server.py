@@ -208,11 +208,7 @@ class Server(uvicorn.Server):
 
 
 def serve_app(
-    app: FastAPI,
-    settings: Settings,
-    listener: socket.socket,
-    *,
-    on_listening: Callable[[], None],
+    app: FastAPI, settings: Settings, listener: socket.socket, *, on_listening: Callable[[], None]
 ) -> tuple[str, Camera] | None:
     """Serve on a listening socket until a signal ends it; ``on_listening`` once it answers.
 

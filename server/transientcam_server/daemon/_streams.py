@@ -103,7 +103,8 @@ class BoundedStream(CutWhereStalled, WebSocketsSansIOProtocol):
         if self.transport.is_closing():  # before uvicorn notices it
             raise ClientDisconnected
         if self._open():
-            self.transport.writelines((_frame_head(len(data)), data))
+            # RFC 6455, Sec. 5.2: the bit FIN, the opcode 2, and 127 for a length of 64 bits
+            self.transport.writelines((b"\x82\x7f" + len(data).to_bytes(8, "big"), data))
         else:  # it ended while this waited
             await super().send(message)
 
@@ -142,11 +143,3 @@ class BoundedStream(CutWhereStalled, WebSocketsSansIOProtocol):
             and not (self.disconnected or self.close_sent)
             and self.conn.state is State.OPEN
         )
-
-
-def _frame_head(length: int) -> bytes:
-    """Return what precedes an unmasked binary message of at least 2^16 bytes.
-
-    RFC 6455, Sec. 5.2: the bit FIN, the opcode 2, and 127 for a length of 64 bits.
-    """
-    return b"\x82\x7f" + length.to_bytes(8, "big")

@@ -26,6 +26,7 @@ from transientcam_server.errors._exceptions import (
     StorageError,
     TokenFileError,
     UnknownToken,
+    invalid,
 )
 from transientcam_server.errors._fence import fenced
 from transientcam_server.errors._kinds import ProblemKind

@@ -32,7 +32,7 @@ from typing import Any
 
 from transientcam_driver import AppliedSequence, CameraError
 from transientcam_driver.errors import StatedError
-from transientcam_server.errors._kinds import ProblemKind
+from transientcam_server.errors._kinds import INVALID_REQUEST, ProblemKind
 
 
 class ServerError(Exception):
@@ -215,3 +215,10 @@ class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so
 
     def __str__(self) -> str:
         return f"{self.kind.title}: {self.detail}"
+
+
+def invalid(field: str, value: object, limit: str) -> Problem:
+    """Return the problem of a value that cannot be used."""
+    return Problem(
+        INVALID_REQUEST, f"{field} must be {limit}.", field=field, value=value, limit=limit
+    )

@@ -21,9 +21,7 @@ class ProblemKind:
 
 
 BAD_REQUEST: Final = ProblemKind(
-    400,
-    "Bad request",
-    "The request is not valid HTTP, or its body is not valid JSON.",
+    400, "Bad request", "The request is not valid HTTP, or its body is not valid JSON."
 )
 HOST_NOT_ALLOWED: Final = ProblemKind(
     403,
@@ -65,9 +63,7 @@ MAY_NOT_LIGHT: Final = ProblemKind(
     "`transientcam token create` makes tokens with it and without it.",
 )
 NOT_FOUND: Final = ProblemKind(
-    404,
-    "Not found",
-    "No resource has this path. /docs lists all of them.",
+    404, "Not found", "No resource has this path. /docs lists all of them."
 )
 UNKNOWN_PRODUCT: Final = ProblemKind(
     404,
@@ -105,9 +101,7 @@ UNKNOWN_CALIBRATION: Final = ProblemKind(
     "No calibration has this id; the list of calibrations has those that exist.",
 )
 UNKNOWN_JOB: Final = ProblemKind(
-    404,
-    "Unknown job",
-    "No job has this id. Jobs that have ended are removed after a while.",
+    404, "Unknown job", "No job has this id. Jobs that have ended are removed after a while."
 )
 UNKNOWN_FRAME: Final = ProblemKind(
     404,
@@ -177,9 +171,7 @@ CALIBRATION_DOUBTED: Final = ProblemKind(
     "wrong everywhere; `force` does so. Frames are computed as before.",
 )
 NO_FORMER_CALIBRATION: Final = ProblemKind(
-    409,
-    "No former calibration",
-    "No other calibration was active before, or it was deleted.",
+    409, "No former calibration", "No other calibration was active before, or it was deleted."
 )
 ESTIMATOR_MISFIT: Final = ProblemKind(
     409,
@@ -275,9 +267,7 @@ PLAN_TOO_LONG: Final = ProblemKind(
     "a smaller budget or an estimator that is named take less.",
 )
 TOO_LARGE: Final = ProblemKind(
-    413,
-    "Request body too large",
-    "The body is longer than `limit` bytes.",
+    413, "Request body too large", "The body is longer than `limit` bytes."
 )
 RANGE_NOT_SATISFIABLE: Final = ProblemKind(
     416,
@@ -340,9 +330,7 @@ PRODUCT_FAILED: Final = ProblemKind(
     "affected; the service's log has the details.",
 )
 CAMERA_FAILED: Final = ProblemKind(
-    502,
-    "Camera error",
-    "The camera answered the command with an error.",
+    502, "Camera error", "The camera answered the command with an error."
 )
 CAMERA_LOST: Final = ProblemKind(
     503,
@@ -377,15 +365,9 @@ NO_FRAME_YET: Final = ProblemKind(
     "`wait_s` lets the request wait for it.",
 )
 NOT_READY: Final = ProblemKind(
-    503,
-    "Not ready",
-    "The camera delivers no frames; `reasons` states why.",
+    503, "Not ready", "The camera delivers no frames; `reasons` states why."
 )
-SHUTTING_DOWN: Final = ProblemKind(
-    503,
-    "Service shutting down",
-    "Connect again in a while.",
-)
+SHUTTING_DOWN: Final = ProblemKind(503, "Service shutting down", "Connect again in a while.")
 TOO_MANY_CLIENTS: Final = ProblemKind(
     503,
     "Too many stream clients",

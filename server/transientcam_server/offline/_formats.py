@@ -246,7 +246,6 @@ def naming_address(place: str) -> Iterator[None]:
 
 
 def _sizes(content: Content) -> dict[str, int]:
-    """Return the length of every axis."""
     arrays = [(each.axes, each.values.shape) for each in content.columns.values()]
     arrays += [(each.axes, each.shape) for each in content.blocks.values()]
     return {

@@ -1,10 +1,5 @@
 """Products of a recording as Dask arrays; needs dask and xarray."""
 
-from collections.abc import Mapping
-from typing import Any
-
-from numpy.typing import NDArray
-
 from transientcam_server.errors import MissingExtra
 from transientcam_server.offline._computing import known_product
 from transientcam_server.offline._job import Job, computed, spans
@@ -36,13 +31,9 @@ def dataset(recording: Recording, job: Job) -> xarray.Dataset:
     variables["frame"] = xarray.Variable(("frame",), recording.series("frame"))
     for name, block in content.blocks.items():
         parts = [
-            dask.array.from_delayed(delayed(_of)(part, name), (rows, *block.shape[1:]), block.dtype)
+            dask.array.from_delayed(part[name], (rows, *block.shape[1:]), block.dtype)
             for rows, part in blocks
         ]
         array = dask.array.concatenate(parts)
         variables[name] = xarray.Variable(block.axes, array, dict(block.attributes))
     return xarray.Dataset(variables, attrs=dict(content.attributes))
-
-
-def _of(part: Mapping[str, NDArray[Any]], name: str) -> NDArray[Any]:
-    return part[name]

@@ -59,9 +59,7 @@ def _computed(
     shape = product.shape(recipe.applied, height, width, times=times)
     description = product.description
     array = ByFrame(
-        (count, *shape),
-        description.dtype,
-        lambda index: frames[index].product(product.name).array,
+        (count, *shape), description.dtype, lambda index: frames[index].product(product.name).array
     )
     return _variable(("frame", *description.axes), array, description.unit, description.summary)
 

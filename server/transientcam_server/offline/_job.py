@@ -124,7 +124,6 @@ def load_kernels(recipe: Recipe) -> None:
 
 
 def _worker() -> str:
-    """Return the address of this worker."""
     try:
         from distributed import get_worker
 

@@ -16,10 +16,7 @@ from transientcam_server.recording import Recording, ZarrKeys
 
 
 def write_references(
-    output: Path,
-    recording: Recording,
-    url: str | None,
-    progress: Callable[[int, int], None],
+    output: Path, recording: Recording, url: str | None, progress: Callable[[int, int], None]
 ) -> None:
     """Write the references of a recording as JSON.
 

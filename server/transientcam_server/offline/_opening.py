@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from transientcam.notebook import table_html
-from transientcam_driver import RawFrame
 from transientcam_server.errors import InputError
 from transientcam_server.imaging import (
     Recipe,
@@ -150,7 +149,7 @@ class OpenedRecording(Sequence[ComputedFrame]):
         if isinstance(index, slice):
             return [self[each] for each in range(*index.indices(len(self)))]
         place = range(len(self))[index]
-        return ComputedFrame(place, self.recipe, self._read)
+        return ComputedFrame(place, self.recipe, self._recording.frame)
 
     def __len__(self) -> int:
         return self._recording.frames
@@ -180,6 +179,3 @@ class OpenedRecording(Sequence[ComputedFrame]):
         """Return name, sequence and settings as a table, for notebooks."""
         rows = {"calibration": self._recording.header.calibration.get("id", "nominal")}
         return table_html(repr(self), rows | self.sequence | self.settings)
-
-    def _read(self, index: int) -> RawFrame:
-        return self._recording.frame(index)

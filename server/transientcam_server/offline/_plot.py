@@ -51,10 +51,7 @@ def _draw_pixel(figure: Any, cube: TransientCube) -> None:
 
 def _draw_images(figure: Any, cube: TransientCube) -> None:
     axes = figure.subplots(2, 1 + _FRAMES // 2)
-    images = (
-        ("range / m", cube.range_m, "viridis"),
-        ("indirect", cube.indirect, "magma"),
-    )
+    images = (("range / m", cube.range_m, "viridis"), ("indirect", cube.indirect, "magma"))
     for panel, (title, image, colours) in zip(axes[:, 0], images, strict=True):
         drawn = panel.imshow(image, cmap=colours)
         panel.set_title(title)

@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import InputError
-from transientcam_server.imaging import (
-    PRODUCTS,
-    Column,
-    Product,
-    SettingsVersion,
-    parts_of,
-    unmet,
-)
+from transientcam_server.imaging import PRODUCTS, Column, Product, SettingsVersion, parts_of, unmet
 from transientcam_server.offline._computing import ComputedFrame, known_product
 from transientcam_server.offline._formats import SINKS, Block, Content, Row, sink_of, write
 from transientcam_server.recording import (

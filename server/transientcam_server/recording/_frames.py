@@ -79,7 +79,8 @@ class RecordedFrames:
         reconstruction = self._reconstruction(settings)
         key = number, reconstruction.id
         task = self._frames.get(key)
-        if task is None or _failed(task):  # a frame not yet written may exist next time
+        failed = task and task.done() and (task.cancelled() or task.exception() is not None)
+        if task is None or failed:  # a frame not yet written may exist next time
             task = self.pipeline.workers.start(self._read(number, reconstruction))
             self._frames[key] = task
         self._frames.move_to_end(key)
@@ -135,10 +136,6 @@ class RecordedFramesCache:
         while len(self._opened) > _OPENED:
             self._opened.popitem(last=False)
         return found
-
-
-def _failed(task: "asyncio.Task[Frame]") -> bool:
-    return task.done() and (task.cancelled() or task.exception() is not None)
 
 
 def timeline(captured_s: NDArray[Any]) -> dict[str, Any]:

@@ -41,10 +41,7 @@ SERIES: Final[dict[str, tuple[str, dict[str, str]]]] = {
     "device_time_s": ("<f8", {"units": "s", "long_name": "begin of the first exposure"}),
     "host_time_s": ("<f8", {"units": "s", "long_name": "arrival of the last image, Unix time"}),
     "capture_s": ("<f8", {"units": "s", "long_name": "first exposure to last read-out"}),
-    "temperature_c": (
-        "<f8",
-        {"units": "degC", "long_name": "temperature of the sensor"},
-    ),
+    "temperature_c": ("<f8", {"units": "degC", "long_name": "temperature of the sensor"}),
     "lost_images": ("<i8", {"units": "1", "long_name": "images lost on the cable before"}),
     "dropped_frames": ("<i8", {"units": "1", "long_name": "frames the recorder dropped before"}),
     "crc32": ("<u4", {"long_name": "CRC-32 of the images' uint16 values, little endian"}),
@@ -383,7 +380,6 @@ def require_plain(document: Mapping[str, Any]) -> None:
 
 
 def _finite(name: str, *values: float) -> float:
-    """Return the first value."""
     for value in values:
         if not math.isfinite(value):
             raise ValueError(f"{name} is {value}")

@@ -15,11 +15,7 @@ from typing import Any, Final
 
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import Problem, RecordingInUse, kinds
-from transientcam_server.recording import (
-    _layout as layout,
-    _names as names,
-    _recovery as recovery,
-)
+from transientcam_server.recording import _layout as layout, _names as names, _recovery as recovery
 from transientcam_server.recording._descriptions import Descriptions, of_recorder, of_removed
 from transientcam_server.recording._directory import Directory, id_of
 from transientcam_server.recording._disk_threads import DiskThreads
@@ -303,9 +299,11 @@ class Library:
         recording_id = f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
         name = options.name or names.default_name(moment)
         header = self._header(recording_id, name, started_s)
+        least = self._settings.min_free_bytes
         try:
             self._directory.make()
-            self._require_room()
+            if (free := self._directory.free_bytes()) < least:
+                raise OSError(28, f"{free} bytes are free, {least} have to stay so")
             path = self._directory.new(recording_id)
             writer = RecordingWriter(path, header, annotations=options.annotations)
         except OSError as error:
@@ -336,11 +334,6 @@ class Library:
         frame_bytes = header.applied.images * header.capabilities.image_bytes
         return max(2, self._settings.queue_bytes // frame_bytes)
 
-    def _require_room(self) -> None:
-        free, least = self._directory.free_bytes(), self._settings.min_free_bytes
-        if free < least:
-            raise OSError(28, f"{free} bytes are free, {least} have to stay so")
-
     def _dropped(self, count: int, total: int) -> None:
         self._notify("recording-dropped", {"count": count, "total": total})
 
@@ -353,7 +346,9 @@ class Library:
                 "synced_frames": progress.synchronised_frames,
             }
             if self._directory.find(recording_id) is None:
-                self._keep_removed(recorder)
+                self._removed[recording_id] = of_removed(recorder)  # it stays listed
+                while len(self._removed) > _REMOVED:
+                    del self._removed[next(iter(self._removed))]
         self._counted = self._counted[0].after(progress), recorder
         details = {
             "recording": recording_id,
@@ -363,13 +358,6 @@ class Library:
             "dropped_frames": progress.dropped_frames,
         }
         self._notify("recording-stopped", details)
-
-    def _keep_removed(self, recorder: Recorder) -> None:
-        """Go on listing a recording whose file was removed while it was written."""
-        recording_id = recorder.header.recording_id
-        self._removed[recording_id] = of_removed(recorder)
-        while len(self._removed) > _REMOVED:
-            del self._removed[next(iter(self._removed))]
 
     def _wait(self, recorder: Recorder, stalled_s: float) -> bool:
         """Wait until a recorder has ended, or its disk does nothing; return whether it has."""

@@ -271,11 +271,8 @@ class Recorder:
         return self._waiting.popleft() if self._waiting else None
 
     def _is_ours(self, applied: AppliedSequence) -> bool:
-        ours = self.header.applied
-        return (applied.sequence, applied.low_frequency_hz) == (
-            ours.sequence,
-            ours.low_frequency_hz,
-        )
+        own = self.header.applied
+        return (applied.sequence, applied.low_frequency_hz) == (own.sequence, own.low_frequency_hz)
 
     def _check_limits(self) -> None:
         """Flush to the disk, and stop at the limits."""

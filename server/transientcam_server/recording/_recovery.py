@@ -74,7 +74,10 @@ def _copied(part: Path) -> Path:
     """Copy what is whole of an unfinished recording; the copy is on the disk."""
     copy = part.with_name(part.name.removesuffix(layout.PART_SUFFIX) + layout.SCRATCH_SUFFIX)
     try:
-        _require_room(part)
+        needed, free = part.stat().st_size, shutil.disk_usage(part.parent).free
+        if needed > free:
+            reason = f"{needed} bytes are needed to recover it, {free} are free"
+            raise OSError(28, reason, str(part))
         with part.open("rb") as stream:
             require_sound_heaps(stream)
         sealed = sealed_frames(part)
@@ -127,9 +130,3 @@ def _require_nothing_more(part: Path, path: Path) -> None:
     except NotARecording as error:
         _log.warning("%s", error)
     raise FileExistsError(17, "there is a recording already", str(path))
-
-
-def _require_room(part: Path) -> None:
-    needed, free = part.stat().st_size, shutil.disk_usage(part.parent).free
-    if needed > free:
-        raise OSError(28, f"{needed} bytes are needed to recover it, {free} are free", str(part))

@@ -134,7 +134,9 @@ class ReplayCamera(HostCamera):
         """Pause; a ``read_frame`` that is waiting raises NotStreaming."""
         with self._changed:
             self._require_open()
-            self._pause()
+            if self._state is CameraState.STREAMING:
+                self._state = CameraState.IDLE
+            self._changed.notify_all()
 
     def status(self) -> Status:
         """Return the status that a device would report. Raises CameraLost after the last frame."""
@@ -198,14 +200,10 @@ class ReplayCamera(HostCamera):
         times = self._recording.series("device_time_s")
         return float(times[-1] - times[0]) + 1.0 / self.applied.frame_rate_hz
 
-    @property
-    def _length_frames(self) -> int:
-        numbers = self._recording.series("device_frame")
-        return int(numbers[-1]) - int(numbers[0]) + 1
-
     def _take(self, now_s: float) -> RawFrame:
         index, shift_s = self._index, self._round * self._length_s
-        shift_frames = self._round * self._length_frames
+        numbers = self._recording.series("device_frame")
+        shift_frames = self._round * (int(numbers[-1]) - int(numbers[0]) + 1)
         self._advance(now_s)
         raw = self._frame(index)
         self._temperature_c = raw.temperature_c
@@ -242,11 +240,6 @@ class ReplayCamera(HostCamera):
         late = now_s - self._due_s > between_s
         self._due_s = (now_s if late else self._due_s) + between_s
 
-    def _pause(self) -> None:
-        if self._state is CameraState.STREAMING:
-            self._state = CameraState.IDLE
-        self._changed.notify_all()
-
     def _require_more(self) -> None:
         if self._index >= self._recording.frames:
             self._state = CameraState.DISCONNECTED
@@ -261,14 +254,10 @@ def _open(name: CameraName, clock: Clock) -> Camera:
     return ReplayCamera(replay.path, speed=replay.speed, loop=replay.loop, clock=clock)
 
 
-def _check(name: CameraName) -> None:
-    Recording(parse_replay(name).path).close()
-
-
 PLUGIN: Final = CameraPlugin(
     summary="a recording, every frame again, bit for bit (docs/recordings.md)",
     usage="recording:FILE",
     open=_open,
-    check=_check,
+    check=lambda name: Recording(parse_replay(name).path).close(),
     options={"speed": "original, fast or a factor", "loop": "on: begin anew after the last frame"},
 )

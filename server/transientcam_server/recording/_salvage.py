@@ -47,7 +47,8 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
                 copy[name][:] = storage.values(name)[:rows]
             else:
                 _copy_blocks(dataset, copy, rows, disk)
-            _copy_attributes(dataset, copy[name])
+            for attribute in sorted(set(dataset.attrs) - _SCALE_ATTRIBUTES):
+                copy[name].attrs[attribute] = dataset.attrs[attribute]
         _restore_scales(datasets, copy)
 
 
@@ -91,12 +92,6 @@ def _copy_blocks(dataset: swmr.Dataset, copy: swmr.File, rows: int, disk: DiskFi
         mask, chunk = dataset.id.read_direct_chunk(place)
         blocks.id.write_direct_chunk(place, chunk, filter_mask=mask)
         disk.require_written()
-
-
-def _copy_attributes(dataset: swmr.Dataset, copy: swmr.Dataset) -> None:
-    for name in dataset.attrs:
-        if name not in _SCALE_ATTRIBUTES:
-            copy.attrs[name] = dataset.attrs[name]
 
 
 def _restore_scales(datasets: dict[str, swmr.Dataset], copy: swmr.File) -> None:

@@ -32,7 +32,9 @@ class RecordingWriter:
         made = path.with_suffix(layout.SCRATCH_SUFFIX)
         self._lock = lock.create(made)
         try:
-            _require_none(path, self.part)
+            for each in (path, self.part):
+                if each.exists():
+                    raise FileExistsError(17, "there is a recording already", str(each))
             _write(self._lock.descriptor, empty)
             self._rows = swmr.Appender(made, ["raw"], [*layout.SERIES, *layout.NUMBERS], seal=seal)
             made = made.rename(self.part)
@@ -115,12 +117,6 @@ def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _require_none(*paths: Path) -> None:
-    for path in paths:
-        if path.exists():
-            raise FileExistsError(17, "there is a recording already", str(path))
 
 
 def _write(descriptor: int, data: bytes) -> None:

@@ -151,7 +151,8 @@ class ZarrKeys:
         return os.pread(self._recording.descriptor, place.size_bytes, place.offset_bytes)
 
     def _place(self, numbers: tuple[int, ...]) -> Place:
-        descriptor, corner = self._recording.descriptor, self._corner(numbers)
+        descriptor = self._recording.descriptor
+        corner = tuple(map(int.__mul__, numbers, self._raw_chunks))
         try:
             offset, size = place_of_chunk(self._raw, corner, os.fstat(descriptor).st_size)
         except Exception as error:  # h5py raises anything of a damaged file
@@ -160,9 +161,6 @@ class ZarrKeys:
         last = min(size, seal.SIZE_BYTES)
         end = os.pread(descriptor, last, offset + size - last)
         return Place(offset, seal.unsealed_size(size, end))
-
-    def _corner(self, numbers: tuple[int, ...]) -> tuple[int, ...]:
-        return tuple(map(int.__mul__, numbers, self._raw_chunks))
 
 
 def _chunks_of(column: Column) -> tuple[int, ...]:

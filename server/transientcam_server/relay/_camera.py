@@ -212,7 +212,8 @@ class RelayCamera(HostCamera):
                 return raw
             if self._outdated:
                 self._refresh()
-            if now_s - self._heard_s > self._silent_s:
+            frame_s = 1.0 / self._applied.frame_rate_hz
+            if now_s - self._heard_s > max(SILENT_S, SILENT_PERIODS * frame_s):
                 self._ask()
             if now_s >= end_s:
                 raise FrameTimeout(timeout_s)
@@ -362,10 +363,6 @@ class RelayCamera(HostCamera):
         return CameraLost(reason)
 
     # -- frames ---------------------------------------------------------------------------------
-
-    @property
-    def _silent_s(self) -> float:
-        return max(SILENT_S, SILENT_PERIODS / self._applied.frame_rate_hz)
 
     def _noticed(self, notice: transientcam.Notice) -> None:
         """Note what a notice of the stream says; it is acted on between two messages."""

@@ -95,7 +95,10 @@ class Origin:
                     path=tuple(map(str, info["path"])),
                     version=str(info["version"]),
                     role=str(info["caller"]["role"]),
-                    capabilities=_capabilities(camera["capabilities"]),
+                    capabilities=replace(
+                        dataclass_of(Capabilities, camera["capabilities"]),
+                        phase_offsets=False,  # they cannot be shifted over REST
+                    ),
                     sensor=camera["sensor"] and dataclass_of(tm.noise.Sensor, camera["sensor"]),
                     intrinsics=camera["intrinsics"],
                     sequence=self._client.sequence,
@@ -250,11 +253,6 @@ class _WithHeaders(httpx.AsyncHTTPTransport):
         """Send a request with them."""
         request.headers.update(self._headers)
         return await super().handle_async_request(request)
-
-
-def _capabilities(document: Mapping[str, Any]) -> Capabilities:
-    """Return what can be done through a relay: phases cannot be shifted over REST."""
-    return replace(dataclass_of(Capabilities, document), phase_offsets=False)
 
 
 def require_same_camera(known: Capabilities, now: Capabilities) -> None:

@@ -59,7 +59,7 @@ def asyncapi(*, version: str, host: str, secure: bool, root_path: str = "") -> d
                                     "type": "string",
                                     "const": wire.SUBPROTOCOL,
                                 }
-                            },
+                            }
                         ),
                         "bindingVersion": "0.1.0",
                     }
@@ -75,9 +75,7 @@ def asyncapi(*, version: str, host: str, secure: bool, root_path: str = "") -> d
 
 
 def _closing() -> str:
-    codes = ", ".join(
-        f"{code.value} {code.name.lower().replace('_', ' ')}" for code in wire.CloseCode
-    )
+    codes = ", ".join(f"{each} {each.name.lower().replace('_', ' ')}" for each in wire.CloseCode)
     return f"One connection of one client. It ends with one of the codes {codes}."
 
 
@@ -87,7 +85,7 @@ def _operation(name: str) -> dict[str, Any]:
         "action": "receive" if name in _OF_CLIENT else "send",
         "channel": stream,
         "summary": _SUMMARIES[name],
-        "messages": [_in_stream(name)],
+        "messages": [{"$ref": f"#/channels/stream/messages/{name}"}],
     }
 
 
@@ -255,7 +253,3 @@ def _or_nil(schema: _Schema) -> _Schema:
 
 def _reference(kind: str, name: str) -> dict[str, str]:
     return {"$ref": f"#/components/{kind}/{name}"}
-
-
-def _in_stream(name: str) -> dict[str, str]:
-    return {"$ref": f"#/channels/stream/messages/{name}"}

@@ -51,10 +51,7 @@ async def problem_kind(slug: Annotated[str, PathParameter()]) -> HTMLResponse:
     )
 
 
-_SWAGGER: Final = {
-    "swagger-ui-bundle.js": "text/javascript",
-    "swagger-ui.css": "text/css",
-}
+_SWAGGER: Final = {"swagger-ui-bundle.js": "text/javascript", "swagger-ui.css": "text/css"}
 # in a file of its own, because the pages of this service run no inline script
 _START_SWAGGER: Final = """\
 window.addEventListener("load", () => SwaggerUIBundle({

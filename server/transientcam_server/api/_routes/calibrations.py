@@ -78,12 +78,7 @@ async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
     "/calibrations",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Measure a calibration",
-    responses=ACCEPTED
-    | documented(
-        kinds.CAMERA_BUSY,
-        kinds.RECORDING_RUNS,
-        kinds.TOO_MANY_JOBS,
-    ),
+    responses=ACCEPTED | documented(kinds.CAMERA_BUSY, kinds.RECORDING_RUNS, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.OPERATOR, lease=True, light=True)
 async def measure_calibration(
@@ -157,11 +152,7 @@ async def restore_calibration(service: ServiceOf) -> ActiveDocument:
     status_code=status.HTTP_201_CREATED,
     summary="Take a calibration in",
     openapi_extra=_FILE,
-    responses=documented(
-        kinds.TOO_LARGE,
-        kinds.INVALID_CALIBRATION,
-        kinds.CALIBRATION_NOT_STORED,
-    ),
+    responses=documented(kinds.TOO_LARGE, kinds.INVALID_CALIBRATION, kinds.CALIBRATION_NOT_STORED),
 )
 @needs(Role.OPERATOR, lease=False)  # no frame is calibrated by it yet
 async def import_calibration(service: ServiceOf, request: Request) -> CalibrationDocument:
@@ -198,9 +189,7 @@ async def read_calibration(service: ServiceOf, calibration: _Calibration) -> Cal
     "/calibrations/{calibration}",
     summary="Delete a calibration",
     responses=documented(
-        kinds.UNKNOWN_CALIBRATION,
-        kinds.CALIBRATION_IN_USE,
-        kinds.CALIBRATION_NOT_STORED,
+        kinds.UNKNOWN_CALIBRATION, kinds.CALIBRATION_IN_USE, kinds.CALIBRATION_NOT_STORED
     ),
 )
 @needs(Role.ADMIN, lease=False)
@@ -231,11 +220,6 @@ async def read_calibration_file(
     )
 
 
-def _harmonics(stored: StoredCalibration) -> HarmonicsDocument | None:
-    document = to_document(stored.waveform)
-    return None if document is None else HarmonicsDocument(**document)
-
-
 async def _receive(request: Request, part: FilePath, *, limit: int) -> None:
     received, waiting = 0, bytearray()
     with part.open("wb") as file:
@@ -260,7 +244,7 @@ def _active(service: Service) -> ActiveDocument:
 def _document(
     service: Service, stored: StoredCalibration, drift: Drift | None
 ) -> CalibrationDocument:
-    subject = stored.subject
+    subject, waveform = stored.subject, to_document(stored.waveform)
     misfit = service.calibrations.misfit(stored, service.applied)
     active = stored.id == service.calibrations.active_id
     return CalibrationDocument(
@@ -280,6 +264,6 @@ def _document(
         active=active,
         verdict=VerdictDocument.model_validate(stored.verdict.to_document()),
         forced=stored.notes.get("forced") is True,
-        harmonics=_harmonics(stored),
+        harmonics=None if waveform is None else HarmonicsDocument(**waveform),
         drift=DriftDocument.model_validate(drift) if active and drift else None,
     )

@@ -53,15 +53,12 @@ async def read_choices(service: ServiceOf) -> CameraChoicesDocument:
 
     Services of other cameras are in `GET /cameras`.
     """
+    checked = await asyncio.to_thread(lambda: list(guarded("USB", checks)))
     return CameraChoicesDocument(
         current=service.settings.camera,
-        missing=[each for each in await asyncio.to_thread(_checked) if each["level"] != "ok"],
+        missing=[each.to_document() for each in checked if each.level != "ok"],
         **await asyncio.to_thread(cameras_here, network=True),
     )
-
-
-def _checked() -> list[dict[str, Any]]:
-    return [each.to_document() for each in guarded("USB", checks)]
 
 
 @router.put(

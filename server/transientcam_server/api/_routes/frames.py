@@ -7,9 +7,9 @@ from fastapi import APIRouter, Query
 
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.frame import HistoryDocument
-from transientcam_server.api._frame_query import LATEST, MAX_NUMBER, FrameName, invalid
+from transientcam_server.api._frame_query import LATEST, MAX_NUMBER, FrameName
 from transientcam_server.api._frame_routes import add_frame_routes
-from transientcam_server.errors import kinds
+from transientcam_server.errors import invalid, kinds
 from transientcam_server.imaging import Frame, Pipeline
 from transientcam_server.service import Service
 
@@ -89,12 +89,7 @@ add_frame_routes(
     router,
     _chosen,
     path="/frames/{frame}",
-    missing=(
-        kinds.UNKNOWN_FRAME,
-        kinds.FRAME_GONE,
-        kinds.NO_FRAME_YET,
-        kinds.SHUTTING_DOWN,
-    ),
+    missing=(kinds.UNKNOWN_FRAME, kinds.FRAME_GONE, kinds.NO_FRAME_YET, kinds.SHUTTING_DOWN),
     frame=("A frame", "Return what is known of the latest frame, or of one of the last seconds."),
     pixel="one pixel",
     product=("A product of a frame", _PRODUCT),

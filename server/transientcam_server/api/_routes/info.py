@@ -30,11 +30,9 @@ async def read_versions(service: ServiceOf) -> VersionsDocument:
 @router.get("/info", summary="The service")
 async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
     """Return what this service is, which products its frames have, and what the caller may do."""
+    device = tm.kernels.device_state()
     return InfoDocument(
-        name=service.identity["name"],
-        version=service.identity["version"],
-        service_id=service.identity["service_id"],
-        path=service.identity["path"],
+        **service.identity,
         api="v1",
         stream=InfoDocument.StreamDocument(
             path=f"{service.settings.root_path}/api/v1/stream",
@@ -49,23 +47,14 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
         ],
         estimators=[_estimator(*each) for each in comparisons.PLUGINS.statements().items()],
         caller=InfoDocument.CallerDocument.model_validate(
-            {
-                "name": principal.name,
-                "role": str(principal.role),
-                "may_light": principal.may_light,
-            }
+            {"name": principal.name, "role": str(principal.role), "may_light": principal.may_light}
         ),
         history=HistoryDocument.model_validate(service.history),
         clients=service.hub.clients,
         kernels=_kernels(service.pipeline.recipe_of(service.applied)),
-        device=_device(),
+        device=None if device is None else InfoDocument.DeviceDocument.model_validate(device),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),
     )
-
-
-def _device() -> InfoDocument.DeviceDocument | None:
-    state = tm.kernels.device_state()
-    return None if state is None else InfoDocument.DeviceDocument.model_validate(state)
 
 
 def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:

@@ -16,8 +16,7 @@ router = APIRouter(tags=["jobs"])
 MAX_WAIT_S: Final = 30.0
 _MAP_TYPES: Final = {"npy": "application/octet-stream", "png": "image/png"}
 _Job = Annotated[
-    str,
-    Path(description="its id, as the list has it", max_length=200, examples=["5a0c1f6be2d4"]),
+    str, Path(description="its id, as the list has it", max_length=200, examples=["5a0c1f6be2d4"])
 ]
 
 
@@ -27,11 +26,7 @@ async def read_jobs(service: ServiceOf) -> JobsDocument:
     return JobsDocument(jobs=[job_document(job) for job in service.jobs.all])
 
 
-@router.get(
-    "/jobs/{job}",
-    summary="A job",
-    responses=documented(kinds.UNKNOWN_JOB),
-)
+@router.get("/jobs/{job}", summary="A job", responses=documented(kinds.UNKNOWN_JOB))
 async def read_job(
     service: ServiceOf,
     job: _Job,

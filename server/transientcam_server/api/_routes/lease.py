@@ -22,10 +22,7 @@ from transientcam_server.service import Service
 router = APIRouter(tags=["lease"])
 _THE_SAME: Final = LeaseRenewal()
 
-_LeaseId = Annotated[
-    str | None,
-    Header(alias=LEASE_HEADER, description="`lease_id` of the lease"),
-]
+_LeaseId = Annotated[str | None, Header(alias=LEASE_HEADER, description="`lease_id` of the lease")]
 
 
 @router.get("/lease", summary="Who controls the camera")
@@ -39,11 +36,7 @@ async def read_lease(service: ServiceOf) -> LeaseDocument:
     "/lease",
     status_code=201,
     summary="Take control of the camera",
-    responses=documented(
-        kinds.LEASE_HELD,
-        kinds.CAMERA_FAILED,
-        kinds.CAMERA_LOST,
-    ),
+    responses=documented(kinds.LEASE_HELD, kinds.CAMERA_FAILED, kinds.CAMERA_LOST),
 )
 @needs(Role.OPERATOR, lease=False)
 async def take_lease(
@@ -71,11 +64,7 @@ async def take_lease(
     return _granted(service, response, lease)
 
 
-@router.put(
-    "/lease",
-    summary="Renew the lease",
-    responses=documented(kinds.LEASE_LOST),
-)
+@router.put("/lease", summary="Renew the lease", responses=documented(kinds.LEASE_LOST))
 @needs(Role.OPERATOR, lease=False)
 async def renew_lease(
     service: ServiceOf,
@@ -88,11 +77,7 @@ async def renew_lease(
     return _granted(service, response, lease)
 
 
-@router.delete(
-    "/lease",
-    summary="Give the lease back",
-    responses=documented(kinds.LEASE_LOST),
-)
+@router.delete("/lease", summary="Give the lease back", responses=documented(kinds.LEASE_LOST))
 @needs(Role.OPERATOR, lease=False)
 async def give_lease_back(service: ServiceOf, lease_id: _LeaseId = None) -> LeaseDocument:
     """Allow changes by every client again; the camera goes on as it is."""

@@ -17,9 +17,7 @@ async def _search(request: Request) -> NeighbourSearch:
 
 
 @router.get("/cameras", summary="Cameras on the local network")
-async def read_cameras(
-    search: Annotated[NeighbourSearch, Depends(_search)],
-) -> NeighboursDocument:
+async def read_cameras(search: Annotated[NeighbourSearch, Depends(_search)]) -> NeighboursDocument:
     """List the cameras that announce themselves by mDNS, after a search of 1.5 s.
 
     Requests within 5 s share a search. A camera stays in the list for 30 s after its last answer.

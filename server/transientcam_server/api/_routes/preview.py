@@ -75,7 +75,9 @@ async def read_preview(
                 if COLOUR_JPEG.fits(each) and not each.over_time
             ),
         )
-    _require_room(service)
+    limit = service.settings.stream.max_clients
+    if service.hub.clients + service.mjpeg_clients >= limit:
+        raise Problem(kinds.TOO_MANY_CLIENTS, f"{limit} clients are connected.", limit=limit)
     headers = {"Cache-Control": "no-store"}
     if asks_for_head(request.scope):
         return Response(media_type=_MEDIA_TYPE_WITH_BOUNDARY, headers=headers)
@@ -98,12 +100,6 @@ class _Mjpeg(StreamingResponse):
         finally:
             self._service.mjpeg_clients -= 1
             await self._pictures.aclose()
-
-
-def _require_room(service: Service) -> None:
-    limit = service.settings.stream.max_clients
-    if service.hub.clients + service.mjpeg_clients >= limit:
-        raise Problem(kinds.TOO_MANY_CLIENTS, f"{limit} clients are connected.", limit=limit)
 
 
 async def _pictures(

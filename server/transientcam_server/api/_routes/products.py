@@ -112,9 +112,7 @@ async def read_product_chunk(
     chunk: Annotated[
         str,
         Path(
-            description="its numbers, with slashes between them",
-            max_length=128,
-            examples=["3/0/0"],
+            description="its numbers, with slashes between them", max_length=128, examples=["3/0/0"]
         ),
     ],
     wanted: downloads.Range = None,

@@ -55,11 +55,7 @@ async def read_reconstruction(
 @router.put(
     "/reconstruction",
     summary="Change how frames are computed",
-    responses=documented(
-        kinds.ESTIMATOR_MISFIT,
-        kinds.ONLY_MOMENTS,
-        kinds.RECONSTRUCTION_CHANGED,
-    )
+    responses=documented(kinds.ESTIMATOR_MISFIT, kinds.ONLY_MOMENTS, kinds.RECONSTRUCTION_CHANGED)
     | etags.CHANGING,
 )
 async def change_reconstruction(

@@ -60,11 +60,7 @@ async def _chosen(
     return ChosenFrame(service, recording, frame, reconstruction)
 
 
-@router.get(
-    "",
-    summary="Which frames a recording has",
-    responses=documented(*_MISSING),
-)
+@router.get("", summary="Which frames a recording has", responses=documented(*_MISSING))
 async def read_frames(service: ServiceOf, recording: RecordingName) -> TimelineDocument:
     """Return how many frames there are, and when they were captured; also while it is recorded."""
     opened = await service.recorded_frames.opened(recording)

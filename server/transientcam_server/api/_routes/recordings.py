@@ -37,9 +37,7 @@ RecordingName = Annotated[
 
 
 @router.get(
-    "/recordings",
-    summary="Recordings, a page at a time",
-    responses=documented(kinds.DISK_STALLED),
+    "/recordings", summary="Recordings, a page at a time", responses=documented(kinds.DISK_STALLED)
 )
 async def read_recordings(
     service: ServiceOf,
@@ -94,20 +92,14 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
     return document(await service.record(order, history_s=wanted.history_s, frame=wanted.frame))
 
 
-@router.get(
-    "/recordings/{recording}",
-    summary="A recording",
-    responses=documented(*_OF_ONE),
-)
+@router.get("/recordings/{recording}", summary="A recording", responses=documented(*_OF_ONE))
 async def read_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """Describe a recording."""
     return document(await service.recordings.disk.run(service.recordings.describe, recording))
 
 
 @router.patch(
-    "/recordings/{recording}",
-    summary="Annotate a recording",
-    responses=documented(*_CHANGED),
+    "/recordings/{recording}", summary="Annotate a recording", responses=documented(*_CHANGED)
 )
 @needs(Role.OPERATOR, lease=False)
 async def annotate_recording(
@@ -119,9 +111,7 @@ async def annotate_recording(
 
 
 @router.post(
-    "/recordings/{recording}/stop",
-    summary="Stop a recording",
-    responses=documented(*_OF_ONE),
+    "/recordings/{recording}/stop", summary="Stop a recording", responses=documented(*_OF_ONE)
 )
 @needs(Role.OPERATOR, lease=False)
 async def stop_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
@@ -130,9 +120,7 @@ async def stop_recording(service: ServiceOf, recording: RecordingName) -> Record
 
 
 @router.delete(
-    "/recordings/{recording}",
-    summary="Delete a recording",
-    responses=documented(*_CHANGED),
+    "/recordings/{recording}", summary="Delete a recording", responses=documented(*_CHANGED)
 )
 @needs(Role.ADMIN, lease=False)
 async def delete_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
@@ -148,9 +136,7 @@ async def delete_recording(service: ServiceOf, recording: RecordingName) -> Reco
     | documented(*_OF_ONE, kinds.RECORDING_UNFINISHED, kinds.RANGE_NOT_SATISFIABLE),
 )
 async def read_recording_file(
-    service: ServiceOf,
-    recording: RecordingName,
-    wanted: downloads.Range = None,
+    service: ServiceOf, recording: RecordingName, wanted: downloads.Range = None
 ) -> FileResponse:
     """Download a recording as HDF5; h5py, xarray and MATLAB open it."""
     path = await service.recordings.disk.run(service.recordings.path, recording)

@@ -54,9 +54,7 @@ _Sequence = Annotated[
     responses=etags.READING,
 )
 async def read_sequence(
-    service: ServiceOf,
-    response: Response,
-    if_none_match: etags.IfNoneMatch = None,
+    service: ServiceOf, response: Response, if_none_match: etags.IfNoneMatch = None
 ) -> Any:
     """Return the sequence as the camera really set it, and what follows from it."""
     tag = _tag(service.applied)
@@ -80,10 +78,7 @@ async def read_sequence(
     | etags.CHANGING,
 )
 async def change_sequence(
-    service: ServiceOf,
-    response: Response,
-    sequence: _Sequence,
-    if_match: etags.IfMatch = None,
+    service: ServiceOf, response: Response, sequence: _Sequence, if_match: etags.IfMatch = None
 ) -> AppliedDocument:
     """Set the camera to a sequence, between two frames; what is absent takes its default, or where
     the camera cannot do that what is nearest.
@@ -98,9 +93,7 @@ async def change_sequence(
 
 
 @router.post(
-    "/sequence/validate",
-    summary="Check a sequence",
-    responses=documented(kinds.INVALID_SEQUENCE),
+    "/sequence/validate", summary="Check a sequence", responses=documented(kinds.INVALID_SEQUENCE)
 )
 @needs(Role.VIEWER, lease=False)
 async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:

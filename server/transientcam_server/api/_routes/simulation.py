@@ -118,11 +118,7 @@ def _announce(service: Service, simulation: Simulation, done: asyncio.Future[Non
     changed = _document(simulation)
     service.hub.notify(
         "simulation-changed",
-        {
-            "scene": changed.scene,
-            "effects": dict(changed.effects),
-            "diffusor": changed.diffusor,
-        },
+        {"scene": changed.scene, "effects": dict(changed.effects), "diffusor": changed.diffusor},
     )
 
 

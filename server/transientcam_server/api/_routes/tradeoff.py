@@ -10,11 +10,7 @@ from transientcam_server.api._auth import Role
 from transientcam_server.api._auth.permissions import needs
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.job import JobDocument
-from transientcam_server.api._documents.plan import (
-    AccuracyName,
-    TradeoffDocument,
-    TradeoffRequest,
-)
+from transientcam_server.api._documents.plan import AccuracyName, TradeoffDocument, TradeoffRequest
 from transientcam_server.api._job_answers import ACCEPTED
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import kinds

@@ -17,11 +17,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import CalibrationCapture
 from transientcam_server.imaging._calibrations.verdict import Finding, Verdict, word_of
-from transientcam_server.imaging._recipe.calibration import (
-    NOMINAL_ID,
-    Calibration,
-    nominal_gains,
-)
+from transientcam_server.imaging._recipe.calibration import NOMINAL_ID, Calibration, nominal_gains
 
 _Array = NDArray[Any]
 
@@ -168,9 +164,10 @@ def _tests(light: _Light, metres: float) -> tuple[tuple[str, ...], tuple[Finding
         field_m = float(np.ptp(field[known])) * metres
     else:
         offset_m = field_m = np.nan
+    unlike_share = float(unlike[known].mean()) if known.any() else np.nan
     findings = (
         Finding("unknown_share", float(1 - known.mean()), LIMIT_UNKNOWN, "share"),
-        Finding("unlike_share", _mean(unlike, known), LIMIT_SHARE, "share"),
+        Finding("unlike_share", unlike_share, LIMIT_SHARE, "share"),
         Finding("residual_m", _most(residual_m, known), LIMIT_RESIDUAL_M, "m"),
         Finding("harmonic_phase_rad", _most(phase, known), LIMIT_PHASE_RAD, "rad"),
         Finding("magnitude_share", _most(magnitude, known), LIMIT_MAGNITUDE, "share"),
@@ -188,7 +185,7 @@ def _harmonic_phases(light: _Light) -> tuple[float, _Array]:
     common_rad, worst = 0.0, np.zeros(_grid(light))
     for j in range(2, len(light.moments)):
         centre_rad, apart = light.angles(light.unit(j) / first**j)
-        common_rad = max(common_rad, abs(centre_rad), key=_nan_last)
+        common_rad = float(np.maximum(common_rad, abs(centre_rad)))  # NaN stays
         worst = np.fmax(worst, apart.beyond_noise())
     return common_rad, worst
 
@@ -275,15 +272,7 @@ def _grid(light: _Light) -> tuple[int, int]:
     return rows, columns
 
 
-def _mean(unlike: _Array, known: _Array) -> float:
-    return float(unlike[known].mean()) if known.any() else np.nan
-
-
 def _most(values: _Array, known: _Array) -> float:
     """Return what all but as many blocks keep as may be unlike."""
     kept = np.nan_to_num(values[known])
     return float(np.quantile(kept, 1 - LIMIT_SHARE)) if kept.size else np.nan
-
-
-def _nan_last(value: float) -> float:
-    return np.inf if np.isnan(value) else value

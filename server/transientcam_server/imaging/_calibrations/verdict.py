@@ -97,7 +97,8 @@ class Verdict:
         ]
         text = "; ".join(said) or "no pixel has light that can be judged"
         text = text[0].upper() + text[1:] + "."
-        return text + _FLAT_WALL if self.word == "in-doubt" and _only_far(failed) else text
+        only_far = all(each.test in _FAR for each in failed)
+        return text + _FLAT_WALL if self.word == "in-doubt" and only_far else text
 
     def to_document(self) -> dict[str, Any]:
         """Return the verdict as JSON."""
@@ -134,10 +135,6 @@ class Verdict:
             )
         except (AssertionError, KeyError, TypeError, ValueError):
             return None
-
-
-def _only_far(failed: list[Finding]) -> bool:
-    return all(each.test in _FAR for each in failed)
 
 
 def word_of(findings: tuple[Finding, ...]) -> Word:

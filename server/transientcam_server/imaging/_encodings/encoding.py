@@ -1,6 +1,5 @@
 """The formats of HTTP answers. Their writers run on workers."""
 
-import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -8,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from transientcam import Frame, wire
-from transientcam.frame import npz_bytes
+from transientcam.frame import npy_bytes, npz_bytes
 from transientcam_server.imaging._encodings import files, pictures
 from transientcam_server.imaging._products.products import Product
 
@@ -46,12 +45,6 @@ def message(frame: Frame) -> bytes:
     )
 
 
-def _npy(frame: Frame) -> bytes:
-    file = io.BytesIO()
-    np.save(file, frame.array, allow_pickle=False)
-    return file.getvalue()
-
-
 def _is_image(product: Product) -> bool:
     return product.png_steps is not None
 
@@ -65,7 +58,7 @@ def _is_cloud(product: Product) -> bool:
 
 
 MSGPACK: Final = Encoding("msgpack", wire.MEDIA_TYPE, message)
-NPY: Final = Encoding("npy", "application/x-npy", _npy)
+NPY: Final = Encoding("npy", "application/x-npy", npy_bytes)
 NPZ: Final = Encoding("npz", "application/x-npz", npz_bytes, archive=True)
 PNG: Final = Encoding("png", "image/png", pictures.png, _is_image)
 COLOUR_PNG: Final = Encoding("colour-png", "image/png", pictures.colour_png, _is_image)

@@ -54,11 +54,7 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> PredictedStdDocumen
     if not known.size:
         return None
     median_m, p90_m = np.quantile(known, (0.5, 0.9)).tolist()
-    return {
-        "median": median_m,
-        "p90": p90_m,
-        "first_order_share": float(first_order.mean()),
-    }
+    return {"median": median_m, "p90": p90_m, "first_order_share": float(first_order.mean())}
 
 
 def _of_pisarenko(
@@ -126,10 +122,7 @@ def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
     return beyond_noise(found, of_all)
 
 
-def beyond_noise(
-    found: tm.Reconstruction,
-    noise_of: Callable[..., tm.noise.MomentNoise],
-) -> _Array:
+def beyond_noise(found: tm.Reconstruction, noise_of: Callable[..., tm.noise.MomentNoise]) -> _Array:
     """Return which lit pixels (H, W) have moments that noise alone does not explain.
 
     Moments of light have a Toeplitz matrix without negative eigenvalues (Proposition 1); here the
@@ -153,8 +146,7 @@ def beyond_noise(
 
 
 def _beyond_own_share(
-    found: tm.Reconstruction,
-    noise_of: Callable[..., tm.noise.MomentNoise],
+    found: tm.Reconstruction, noise_of: Callable[..., tm.noise.MomentNoise]
 ) -> _Array:
     """Return where the part of the noise that is a pixel's own does not explain its moments.
 

@@ -30,7 +30,9 @@ def ranges_m(
     elif estimator == "pisarenko":
         phase = tm.separate(tm.pisarenko(b), settings.return_threshold).phase_rad
     elif estimator == "likelihood":
-        noise = tm.noise.MomentNoise(_of_zeroth(variance, zeroth))
+        if zeroth == "estimated":  # b_0 is not measured, and has no noise of its own
+            variance = np.concatenate([np.zeros_like(variance[:1]), variance[1:]])
+        noise = tm.noise.MomentNoise(variance)
         phase = tm.likelihood(b, noise).separate(settings.return_threshold).phase_rad
     else:
         plain = settings.model_copy(
@@ -38,10 +40,3 @@ def ranges_m(
         )
         phase = tm.reconstruct(b, plain.for_moments(zeroth=zeroth)).phase_rad
     return np.asarray(tm.range_m(phase, base_frequency_hz), dtype=float)
-
-
-def _of_zeroth(variance: _Array, zeroth: str) -> _Array:
-    """Return the variance with none of b_0 where that is not measured."""
-    if zeroth != "estimated":
-        return variance
-    return np.concatenate([np.zeros_like(variance[:1]), variance[1:]])

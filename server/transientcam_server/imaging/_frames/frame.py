@@ -155,12 +155,7 @@ class Frame:
     def meta(self) -> FrameDocument:
         """Return what is known of the frame, as the wire contract has it."""
         return frame_meta(
-            self.number,
-            self.raw,
-            self.recipe,
-            self._computed,
-            self._reconstruct_s,
-            self._accuracy,
+            self.number, self.raw, self.recipe, self._computed, self._reconstruct_s, self._accuracy
         )
 
     # -- the first hop: stages of the reconstruction -------------------------------------------

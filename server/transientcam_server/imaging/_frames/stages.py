@@ -73,7 +73,9 @@ def compute(
             found = recipe.reconstruct(raw, previous, averaged=averaged, spread=spread)
             computed.reconstruction = found
             _read(found, FIRST)
-            _flag_contradictions(recipe.with_noise_of(found), found)
+            contradictory = contradictions(recipe.with_noise_of(found), found)
+            if contradictory is not None and contradictory.any():
+                found.add_flag(tm.Flags.CONTRADICTORY, contradictory)
             computed.pixels = pixel_counts(found)
             computed.ambient_dn = _ambient_dn(recipe, found)
             computed.frames_averaged = _frames_averaged(found)
@@ -99,12 +101,6 @@ def spread_of(raw: RawFrame) -> tm.kernels.Spread:
     """Return how kernels compute a new frame: on all cores where it is large, else on one."""
     large = math.prod(raw.images.shape[-2:]) >= LEAST_SPREAD_PIXELS
     return tm.kernels.over_all_cores() if large else tm.kernels.at_once
-
-
-def _flag_contradictions(recipe: Recipe, found: tm.Reconstruction) -> None:
-    contradictory = contradictions(recipe, found)
-    if contradictory is not None and contradictory.any():
-        found.add_flag(tm.Flags.CONTRADICTORY, contradictory)
 
 
 def _read(found: tm.Reconstruction, stage: str) -> None:

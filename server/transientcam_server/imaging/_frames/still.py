@@ -37,8 +37,9 @@ class StillFrames:
         if recipe.settings.still_frames == 1 or self._waiting >= MOST_WAITING:
             return None
         before = None
-        if last is not None and last[1] is recipe and _follows(raw, last[0]):
-            before = last[2]
+        if last is not None and last[1] is recipe and not raw.lost_images:
+            follows = (raw.epoch, raw.number) == (last[0].epoch, last[0].number + 1)
+            before = last[2] if follows else None
         self._waiting += 1
         task = self._workers.start(self._average(raw, recipe, previous, before))
         self._last = raw, recipe, task
@@ -59,8 +60,3 @@ class StillFrames:
             return None
         finally:
             self._waiting -= 1
-
-
-def _follows(raw: RawFrame, before: RawFrame) -> bool:
-    whole = raw.number == before.number + 1 and not raw.lost_images
-    return whole and raw.epoch == before.epoch

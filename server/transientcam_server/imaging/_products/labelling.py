@@ -75,7 +75,7 @@ def moment_columns(
         ),
         "gain": Column(("moment",), nominal_gains(sequence, delay_s=applied.delay_s), nominal)
         if gains is None
-        else Column(_pixels(gains.planes), gains.planes, measured),
+        else Column(("moment", "y", "x")[: gains.planes.ndim], gains.planes, measured),
         "sub_phase_rad": Column(
             ("sub_phase",),
             np.asarray(sequence.sub_phases.phases_rad),
@@ -136,7 +136,3 @@ def in_words(column: Column) -> NDArray[Any]:
         return column.values
     words: NDArray[Any] = np.asarray(str(meanings).split())[column.values]
     return words
-
-
-def _pixels(planes: NDArray[Any]) -> tuple[str, ...]:
-    return ("moment", "y", "x")[: planes.ndim]

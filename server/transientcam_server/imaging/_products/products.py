@@ -18,11 +18,7 @@ from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_moments.plugins import CALLERS, PRODUCTS as OF_PACKAGES, MapProduct, mapped
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
-from transientcam_server.imaging._products.labelling import (
-    image_columns,
-    in_words,
-    moment_columns,
-)
+from transientcam_server.imaging._products.labelling import image_columns, in_words, moment_columns
 from transientcam_server.imaging._products.view import Crop, View
 from transientcam_server.imaging._recipe.recipe import Recipe
 
@@ -219,10 +215,6 @@ def _property(name: str) -> Callable[[Recipe, object, View], _Array]:
     return read
 
 
-def _images(recipe: Recipe, raw: RawFrame, view: View) -> _Array:
-    return raw.images
-
-
 def _labels(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
     return {"labels": [asdict(label) | {"kind": label.kind} for label in raw.labels]}
 
@@ -244,20 +236,14 @@ def _evaluation(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
     return arrays | {"reconstruction": recipe.settings.model_dump()}
 
 
-def _row(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
-    return {"y": view.y}
-
-
-def _radius(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
-    return {"radius": BOUNDS_RADIUS}
-
-
 def _intrinsics(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
     height, width = raw.images.shape[-2:]
     return {"intrinsics": asdict(recipe.lens(height, width))}
 
 
-_POLYNOMIAL: Final = ("coefficients",)
+_of_polynomial: Final = partial(
+    Product, needs="coefficients", over_time=True, of_toeplitz=True, reads=("coefficients",)
+)
 _MILLIMETRES: Final = Steps(1e3, "mm")
 _WIRE: Final = wire.PRODUCTS
 
@@ -310,15 +296,8 @@ PRODUCTS: Final[dict[str, Product]] = {
         ),
         Product(_WIRE["moments"], "moments", _property("moments"), fields=_frequencies),
         Product(_WIRE["measured_moments"], "moments", _property("measured"), fields=_frequencies),
-        Product(_WIRE["raw"], "raw", _images, fields=_labels, archive=_evaluation),
-        Product(
-            _WIRE["transient"],
-            "coefficients",
-            _transient,
-            over_time=True,
-            of_toeplitz=True,
-            reads=_POLYNOMIAL,
-        ),
+        Product(_WIRE["raw"], "raw", _property("images"), fields=_labels, archive=_evaluation),
+        _of_polynomial(_WIRE["transient"], compute=_transient),
         Product(
             _WIRE["density_std"],
             "moments",
@@ -328,24 +307,13 @@ PRODUCTS: Final[dict[str, Product]] = {
             of_toeplitz=True,
             reads=("smoothed", "ambient", "settings", "variance_share"),
         ),
-        Product(
-            _WIRE["cumulative"],
-            "coefficients",
-            _cumulative,
-            over_time=True,
-            of_toeplitz=True,
-            reads=_POLYNOMIAL,
-        ),
-        Product(
+        _of_polynomial(_WIRE["cumulative"], compute=_cumulative),
+        _of_polynomial(
             _WIRE["streak"],
-            "coefficients",
-            _streak,
-            over_time=True,
-            of_toeplitz=True,
-            reads=_POLYNOMIAL,
+            compute=_streak,
             of_row=True,
             steps=Steps(1e-7, "1e7 DN/s"),
-            fields=_row,
+            fields=lambda recipe, raw, view: {"y": view.y},
         ),
         Product(
             _WIRE["bounds"],
@@ -354,7 +322,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             over_time=True,
             of_toeplitz=True,
             reads=("moments",),
-            fields=_radius,
+            fields=lambda recipe, raw, view: {"radius": BOUNDS_RADIUS},
         ),
         Product(_WIRE["returns"], "returns", _return_planes, of_view=True),
         Product(_WIRE["pointcloud"], "returns", _pointcloud, fields=_intrinsics),

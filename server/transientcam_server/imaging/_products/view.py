@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from transientcam.documents import FrameDocument, FrameMeta
 from transientcam.wire import MAX_DECIMATION
-from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors import invalid
 
 _IMAGE: Final = ("y", "x")
 DEFAULT_BINS: Final = 64
@@ -46,18 +46,16 @@ class Crop:
         """
         step = 1 if decimation is None else decimation
         if not _is_integer(step) or not 1 <= step <= MAX_DECIMATION:
-            raise _invalid(
-                f"{path}decimation", decimation, f"an integer from 1 to {MAX_DECIMATION}"
-            )
+            raise invalid(f"{path}decimation", decimation, f"an integer from 1 to {MAX_DECIMATION}")
         if region is None:
             return cls(None, step)
         inside = f"x,y,width,height within {width} x {height} pixels, each an integer"
         if len(region) != len(("x", "y", "width", "height")) or not all(map(_is_integer, region)):
-            raise _invalid(f"{path}region", list(region), inside)
+            raise invalid(f"{path}region", list(region), inside)
         x, y, columns, rows = region
         fits = x >= 0 and y >= 0 and x + columns <= width and y + rows <= height
         if not fits or columns < 1 or rows < 1:
-            raise _invalid(f"{path}region", list(region), inside)
+            raise invalid(f"{path}region", list(region), inside)
         whole = (columns, rows) == (width, height)
         return cls(None if whole else (x, y, columns, rows), step)
 
@@ -72,7 +70,7 @@ class Crop:
             numbers = [int(part) for part in region.split(",")]
         except ValueError:
             limit = f"x,y,width,height within {width} x {height} pixels, each an integer"
-            raise _invalid("region", region, limit) from None
+            raise invalid("region", region, limit) from None
         return cls.of(numbers, decimation, height=height, width=width)
 
     @property
@@ -118,16 +116,6 @@ WHOLE: Final = Crop()
 
 def _is_integer(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _invalid(field: str, value: object, limit: str) -> Problem:
-    return Problem(
-        kinds.INVALID_REQUEST,
-        f"{field} must be {limit}.",
-        field=field,
-        value=value,
-        limit=limit,
-    )
 
 
 @dataclass(frozen=True, slots=True)
