@@ -60,6 +60,27 @@ describe("the error of the range", () => {
     expect(errors.now.value).toEqual(noise);
   });
 
+  test("is that of the frame that is held, also where those of one before it come later", async () => {
+    const { status, held, errors } = bench(() => meta(4, 5e-3, 8));
+    const loader = errors.loader;
+    let arrive = (): void => undefined;
+    errors.loader = async (path, products) => {
+      await new Promise<void>((resolve) => (arrive = resolve));
+      return (await bench(() => meta(4, 9e-3, 7)).errors.loader?.(path, products)) ?? [];
+    };
+    status.newest.value = meta(4, null, 7);
+    await vi.advanceTimersByTimeAsync(2500);
+    const late = arrive;
+    errors.loader = loader;
+    status.newest.value = meta(4, null, 8);
+    held.value = true;
+    await vi.advanceTimersByTimeAsync(200);
+    expect(errors.now.value).toEqual(interval(5e-3));
+    late();
+    await vi.advanceTimersByTimeAsync(200);
+    expect(errors.now.value).toEqual(interval(5e-3));
+  });
+
   test("is known of each pixel, with why not to trust it, until the sequence or the scene is another", async () => {
     const { status, errors } = bench(() => meta(4, 5e-3));
     status.newest.value = meta(4);

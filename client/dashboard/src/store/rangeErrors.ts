@@ -128,7 +128,8 @@ export class RangeErrors {
       const first = (await this.loader?.(again ? LIVE : still, PRODUCTS.slice(0, 1))) ?? [];
       const path = again ? liveFrame(first[0]?.message.meta.frame ?? 0) : still;
       const reports = [...first, ...((await this.loader?.(path, PRODUCTS.slice(1))) ?? [])];
-      if (scene === this.#scene.peek()) this.#brought.value = reports.map((report) => frameOf(report, path));
+      // One that was asked for since counts, also where it came before this one.
+      if (scene === this.#scene.peek() && timer === this.#timer) this.#brought.value = reports.map((report) => frameOf(report, path));
     } catch (error) {
       // A camera without errors is asked again with its next sequence; a frame may be gone already.
       if (!refusalIn(error).isGone) return;
