@@ -108,7 +108,7 @@ def _mirrors(scene: str, shape: tuple[int, int]) -> _Array:
     assert loaded.camera is not None
     rays = camera_rays(loaded.camera, width=shape[1], height=shape[0])
     start = np.broadcast_to(loaded.camera.position_m, rays.shape)
-    which = first_hit(loaded, start, rays).which
+    which = first_hit(loaded, start, rays).surface
     kinds = np.array([each.kind == "mirror" for each in loaded.surfaces] + [False])
     return np.asarray(kinds[which].reshape(shape))
 

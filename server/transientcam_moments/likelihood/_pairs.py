@@ -209,8 +209,8 @@ class _Pairs:
 
 def _best_pair(data: Data) -> tuple[SharpFit, Array]:
     """Return the best fit of two returns (P), and the lead over those with another range (P)."""
-    banks: Any = [np.stack(each) for each in data[:3]]
-    stacked = Data(*banks, data.penalty, data.numbers)
+    re, im, weight = (np.stack(each) for each in data[:3])
+    stacked: Any = data._replace(re=re, im=im, weight=weight)  # type: ignore[arg-type]  # arrays
     pairs = _Pairs(stacked, _starts(stacked))
     pairs.improve(FIRST_STEPS)
     pairs.keep(FINALISTS)
