@@ -95,10 +95,9 @@ class RemoteFile(SizedFile):
         if wanted <= _BLOCK_BYTES or number in self._blocks:
             return self._block(number)[begin : begin + wanted]
         piece = self._request(self._place, wanted)
-        for inside in range(
-            -(-self._place // _BLOCK_BYTES), (self._place + wanted) // _BLOCK_BYTES
-        ):
-            first = inside * _BLOCK_BYTES - self._place
+        place = self._place
+        for inside in range(-(-place // _BLOCK_BYTES), (place + wanted) // _BLOCK_BYTES):
+            first = inside * _BLOCK_BYTES - place
             self._keep(inside, piece[first : first + _BLOCK_BYTES])
         return piece
 

@@ -18,7 +18,7 @@ from transientcam_moments.noise import MomentNoise
 
 Offered = TypeVar("Offered")
 _NAME: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
-GROUPS: "Final[dict[str, Plugins[Any]]]" = {}
+GROUPS: dict[str, "Plugins[Any]"] = {}
 """By the names of their entry points."""
 
 

@@ -108,7 +108,7 @@ def _or_plugged(name: Any, known: ValidatorFunctionWrapHandler) -> Any:
         return name if isinstance(name, str) and name in PLUGINS.names() else known(name)
     except ValidationError as error:
         also = "".join(f", {each!r} of another package" for each in PLUGINS.names())
-        listed = {"expected": f"{error.errors()[0]['ctx']['expected']}{also}"}
+        listed = {"expected": f"{error.errors()[0].get('ctx', {})['expected']}{also}"}
         raise PydanticCustomError("literal_error", "Input should be {expected}", listed) from None
 
 

@@ -288,16 +288,24 @@ def _fit_tail(
     So is one tail without a return. Returns what the first has become, and chi-square with the
     prior.
     """
-    given: tuple[Any, ...] = (0,) * (len(data.re) - 1), power, (0,) * 4, data.weight, PRIOR, shapes
+    order, unknowns, weight = (0,) * (len(data.re) - 1), (0,) * 4, data.weight
     allowed = data.numbers >= 4
     state = _tail_of(data, state, power, steps, 0.0, bar_of_tail(4, data.penalty, found))
-    offer_tail(*(*given, *state, data.penalty, allowed, found))
+    x, y, w, v, d, t, cost = state
+    offer_tail(
+        order, power, unknowns, weight, PRIOR, shapes, x, y, w, v, d, t, cost, data.penalty,
+        allowed, found,
+    )  # fmt: skip
     if power != LONE_SHAPE:
         return state
-    x, y, d, t = start_lone(power, *state[:5])
+    x, y, d, t = start_lone(power, x, y, w, v, d)
     bar = bar_of_tail(3, data.penalty, found)
     lone = _tail_of(data, (x, y, 0 * d, d, d, t), power, LONE_STEPS, tail.LONE, bar)
-    join_lone(*(*given, *lone, data.penalty, allowed, found))
+    x, y, w, v, d, t, cost = lone
+    join_lone(
+        order, power, unknowns, weight, PRIOR, shapes, x, y, w, v, d, t, cost, data.penalty,
+        allowed, found,
+    )  # fmt: skip
     return state
 
 

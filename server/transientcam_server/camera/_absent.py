@@ -24,7 +24,6 @@ class AbsentCamera(HostCamera):
     ``wanted``: what each `reconnect` tries to open, which becomes ``found``, with its name.
     """
 
-    off_switch = None
     found: tuple[str, Camera] | None = None
 
     def __init__(self, reason: str = "no camera is chosen", *, wanted: str | None = None) -> None:
@@ -35,6 +34,10 @@ class AbsentCamera(HostCamera):
         limits = {**_LIMITS, **_LIMITS_S, "streaming_readout_s": 0.0}
         self._capabilities = Capabilities(**named, **size, **limits)  # type: ignore[arg-type]
         self._applied = self._capabilities.apply(self._capabilities.nearest(Sequence()), epoch=1)
+
+    @property
+    def off_switch(self) -> None:
+        """None: there is no light."""
 
     def _lost(self, *_: object, **__: object) -> NoReturn:
         raise CameraAbsent(self._reason)

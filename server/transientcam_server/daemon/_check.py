@@ -21,10 +21,10 @@ def require_usable(configuration: Configuration) -> None:
     settings = configuration.settings
     camera = None if settings.camera == NO_CAMERA else settings.camera
     mistakes = []
-    named: tuple[tuple[str, Any, Callable[[Any], object]], ...] = (
+    named: list[tuple[str, Any, Callable[[Any], object]]] = [
         ("camera", camera, check_camera),
         ("calibration", settings.calibration, load_given),
-    )
+    ]
     for name, value, read in named:
         if value is None:
             continue

@@ -1,5 +1,7 @@
 """Products of a recording as Dask arrays; needs dask and xarray."""
 
+from operator import getitem
+
 from transientcam_server.errors import MissingExtra
 from transientcam_server.offline._computing import known_product
 from transientcam_server.offline._job import Job, computed, spans
@@ -31,7 +33,9 @@ def dataset(recording: Recording, job: Job) -> xarray.Dataset:
     variables["frame"] = xarray.Variable(("frame",), recording.series("frame"))
     for name, block in content.blocks.items():
         parts = [
-            dask.array.from_delayed(part[name], (rows, *block.shape[1:]), block.dtype)
+            dask.array.from_delayed(
+                delayed(getitem)(part, name), (rows, *block.shape[1:]), block.dtype
+            )
             for rows, part in blocks
         ]
         array = dask.array.concatenate(parts)
