@@ -1,4 +1,4 @@
-"""Draws the mesh of docs/scenes.md, and leaves its scene in build/vase: ``python -m tools.vase``."""
+"""Draws the mesh of docs/scenes.md: ``python -m tools.vase``; its scene is left in build/vase."""
 
 from pathlib import Path
 

@@ -26,6 +26,7 @@ ON_DAEMON: dict[str, Callable[[str], list[str]]] = {
     "plan": lambda url: ["--daemon", url, "--estimator", NAME],
     "record": lambda url: [url, "--frames", "1", "--name", NAME, "-o", f"{NAME}.h5"],
     "rerun": lambda url: [url, "no-such-product", "--save", f"{NAME}.rrd"],
+    "series": lambda url: [url, "--m", "2,3", "--frames", "2", "--csv", f"{NAME}.csv"],
     "watch": lambda url: [url, "--count", "1"],
 }
 REFUSED = {"calibrate", "conformance", "foxglove", "plan", "rerun"}

@@ -148,7 +148,9 @@ def test_light_that_is_spread_by_less_than_any_return_resolves_may_have_begun_ea
 
     off_m = np.asarray(image.range_m) - range_m
     assert kind == "room" or 0.5 * late < np.median(off_m) < 1.1 * late
-    assert np.median(off_m) < 1.1 * np.median(error_m) < 1.3 * late
+    # of a room, models with and without a return at its beginning spread
+    widest = 1.6 if kind == "room" else 1.3
+    assert np.median(off_m) < 1.1 * np.median(error_m) < widest * late
 
 
 def capture(temperature_c: float) -> RawFrame:
