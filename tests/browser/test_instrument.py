@@ -258,11 +258,15 @@ def test_a_shared_link_opens_the_very_frame_for_another_user(
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     open_page(page)
     page.get_by_role("button", name="Share").click()
-    copied = "async () => (await navigator.clipboard.readText()).includes('recording=')"
-    page.wait_for_function(copied, timeout=60_000)
+    # the text itself: a clipboard may be another's a moment later
+    copied = """async () => {
+        const text = await navigator.clipboard.readText();
+        return text.includes('recording=') ? text : null;
+    }"""
+    link = page.wait_for_function(copied, timeout=60_000).json_value()
     context = browser.new_context()
     other = context.new_page()
-    other.goto(page.evaluate("() => navigator.clipboard.readText()"))
+    other.goto(link)
     other.locator(".replay[data-frame='1']").wait_for()
     other.locator(".panel-map canvas[data-frame]").wait_for()
     ranges = "() => JSON.stringify([...transientcam.store.frames.of('range').value.values])"

@@ -151,11 +151,8 @@ def test_a_service_whose_disk_hangs_serves_all_else_and_ends_when_it_is_to(
     recording = client.get("/api/v1/recordings").raise_for_status().json()["active"]
     (tmp_path / "hangs").touch()
 
-    wait_until(lambda: client.get("/api/v1/recordings").status_code == 503)
+    wait_until(lambda: client.get(f"/api/v1/recordings/{recording}/frames/1").status_code == 503)
     for method, path in (
-        ("GET", "/api/v1/recordings"),
-        ("GET", f"/api/v1/recordings/{recording}"),
-        ("POST", f"/api/v1/recordings/{recording}/stop"),
         ("GET", f"/api/v1/recordings/{recording}/zarr/.zmetadata"),
         ("GET", f"/api/v1/recordings/{recording}/frames/1"),
     ):
@@ -163,6 +160,10 @@ def test_a_service_whose_disk_hangs_serves_all_else_and_ends_when_it_is_to(
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/disk-stalled"), path
         assert int(answer.headers["retry-after"]) >= 1
     assert client.get("/api/v1/frames/latest").status_code == 200
+    # what the recorder knows of what it records is on no disk
+    assert client.get(f"/api/v1/recordings/{recording}").json()["state"] == "recording"
+    stopped = client.post(f"/api/v1/recordings/{recording}/stop").raise_for_status().json()
+    assert stopped["state"] == "finishing"  # and not complete, as long as the disk hangs
     waiting = re.search(
         r"^transientcam_disk_waiting_seconds (\S+)", client.get("/metrics").text, re.M
     )
