@@ -25,6 +25,7 @@ from tests.browser.dashboard import (
 )
 from tests.browser.test_map import product, stop
 from tests.serving import Served
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.shared_daemon
 
@@ -258,12 +259,9 @@ def test_a_shared_link_opens_the_very_frame_for_another_user(
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     open_page(page)
     page.get_by_role("button", name="Share").click()
-    # the text itself: a clipboard may be another's a moment later
-    copied = """async () => {
-        const text = await navigator.clipboard.readText();
-        return text.includes('recording=') ? text : null;
-    }"""
-    link = page.wait_for_function(copied, timeout=60_000).json_value()
+    read = "() => navigator.clipboard.readText()"
+    wait_until(lambda: "recording=" in page.evaluate(read))
+    link = page.evaluate(read)
     context = browser.new_context()
     other = context.new_page()
     other.goto(link)
