@@ -43,6 +43,7 @@ def test_a_chunk_expands_to_its_block(dtype: str) -> None:
         zlib.compress(bytes(49)),
         zlib.compress(bytes(10**6)),
     ],
+    ids=["nothing", "no deflate", "cut", "47 bytes", "49 bytes", "a million"],  # not by their bytes
 )
 def test_a_chunk_of_another_size_is_damage(chunk: bytes) -> None:
     with pytest.raises(ValueError):  # noqa: PT011  (zlib's own words, or ours)
