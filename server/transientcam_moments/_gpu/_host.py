@@ -292,7 +292,7 @@ class Race:
         """
         with self._lock:
             device_s, processor_s = times = self._took_s.setdefault(kind, ([], []))
-            if len(processor_s) < _ROUNDS:
+            if min(len(device_s), len(processor_s)) < _ROUNDS:
                 on_device = len(device_s) <= len(processor_s)
             else:
                 on_device = min(device_s[1:]) < min(processor_s[1:])

@@ -184,6 +184,19 @@ def test_auto_keeps_whichever_computed_the_first_frames_faster() -> None:
     assert race.run("small", way("device"), way("processor")) == "processor"
 
 
+def test_frames_at_the_same_time_are_raced_before_the_device_has_given_two() -> None:
+    """The processor may have had all its turns by then."""
+    race, now_s = _gpu.Race(lambda: 0.0), iter(range(100))
+    race.run("small", lambda: next(now_s), lambda: next(now_s))
+
+    def meanwhile(depth: int) -> int:
+        return race.run("small", lambda: 0, lambda: meanwhile(depth - 1)) if depth else 0
+
+    meanwhile(5)
+    assert len(race._took_s["small"][1]) >= 3
+    race.run("small", lambda: 0, lambda: 0)
+
+
 def test_auto_gives_the_same_frame_whatever_computes_it(
     device: CountingDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
