@@ -17,13 +17,14 @@ from transientcam_server.camera._jobs import Job, Jobs
 from transientcam_server.imaging import PRODUCTS, Pipeline, Recipe
 from transientcam_server.settings import ReconstructionSettings
 
-MAX_VALUES: Final = 2**28
-"""Ranges of one setting, which are kept until they are compared."""
+MAX_VALUES: Final = 2**25
+"""Ranges of one setting, which are kept until they are compared: less than 1.5 GB with truth."""
 _AT_ONCE: Final = 4
 """Frames that are computed; those that come meanwhile are left out."""
 _Array = NDArray[Any]
 _Computed = tuple[_Array, _Array | None, Recipe]
-"""Range (H, W) of a frame, its truth where it is known, and what it was computed with."""
+"""Ranges (P) of the pixels of a frame that count, their truth where it is known, and what they were
+computed with."""
 _OF_SEQUENCE: Final = (
     *("harmonics", "base_frequency_hz", "exposure_s", "takes"),
     *("capture_s", "frame_rate_hz"),
@@ -57,8 +58,8 @@ def start_series(
     async def computed(raw: RawFrame, recipe: Recipe) -> _Computed:
         frame = pipeline.recorded_frame(raw.number, raw, recipe)
         range_m = await frame.product(PRODUCTS["range"])
-        truth_m = (await frame.truth()).range_m if "truth" in pipeline.products else None
-        return range_m, truth_m, frame.recipe
+        truth_m = (await frame.truth()).range_m[pixels] if "truth" in pipeline.products else None
+        return range_m[pixels], truth_m, frame.recipe  # copies: a frame's other pixels go
 
     async def work(job: Job) -> dict[str, Any]:
         loop, rows = asyncio.get_running_loop(), list[dict[str, Any]]()
@@ -103,16 +104,17 @@ def start_series(
 def measured(found: List[_Computed], pixels: _Array, target_m: float | None) -> dict[str, Any]:
     """Return how far ranges of frames scatter, and are off truth or plane, as a row has it."""
     _, truth_m, recipe = found[0]
-    ranges_m = np.array([range_m[pixels] for range_m, _, _ in found])
+    ranges_m = np.array([range_m for range_m, _, _ in found])
     has = np.isfinite(ranges_m)
     seen = pixels.copy()
     seen[pixels] = has.sum(axis=0) > 1
     row: dict[str, Any] = {"valid_share": float(has.mean()), "pixels": int(seen.sum())}
     if not seen.any():
         return row | dict.fromkeys(_FIGURES)
-    ranges_m = ranges_m[:, seen[pixels]].astype(float)
+    there = seen[pixels]
+    ranges_m = ranges_m[:, there].astype(float)
     if truth_m is not None:
-        right_m = np.array([each[seen] for _, each, _ in found if each is not None])
+        right_m = np.array([each[there] for _, each, _ in found if each is not None])
     else:
         image_m = np.zeros(pixels.shape)
         image_m[seen] = np.nanmean(ranges_m, axis=0)

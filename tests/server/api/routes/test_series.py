@@ -125,7 +125,7 @@ def test_without_a_truth_ranges_are_held_against_the_plane_that_fits_best() -> N
     rays = lens.points(np.ones((height, width), np.float32)).astype(float)
     plane_m = 2.0 / np.einsum("i,ihw->hw", np.array([0.1, -0.2, 1.0]), rays)
     noise = 1e-3 * np.array([-1.0, 1.0, 0.0, -1.0, 1.0])[:, None, None]
-    found = [(plane_m + each, None, _recipe(lens)) for each in noise]
+    found = [((plane_m + each).ravel(), None, _recipe(lens)) for each in noise]
 
     row = measured(found, np.ones((height, width), bool), 2e-3)
 
@@ -136,7 +136,7 @@ def test_without_a_truth_ranges_are_held_against_the_plane_that_fits_best() -> N
 
     bump = np.zeros((height, width), bool)
     bump[3, 4] = True
-    raised = [(np.where(bump, each + 0.1, each), None, recipe) for each, _, recipe in found]
+    raised = [(each + 0.1 * bump.ravel(), None, recipe) for each, _, recipe in found]
     off = measured(raised, np.ones((height, width), bool), 5e-3)
     assert off["within_share"] == pytest.approx(1 - 1 / (height * width))
     assert len(found) == frames
