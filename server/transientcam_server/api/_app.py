@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Final
 
 from fastapi import APIRouter, Depends, FastAPI
@@ -45,6 +46,8 @@ from transientcam_server.api._routes import (
     simulation,
     tradeoff,
 )
+from transientcam_server.api._routes.camera import choices
+from transientcam_server.api._shared_answer import SharedAnswer
 from transientcam_server.api._stream import websocket
 from transientcam_server.service import VERSION, Service
 from transientcam_server.settings import Settings
@@ -106,6 +109,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.state.metrics = metrics
     app.state.guard = guard
     app.state.neighbours = NeighbourSearch.of(settings)
+    app.state.choices = SharedAnswer(partial(choices, settings))
     api = APIRouter()
     admitted = [Depends(permissions.admit), Depends(query.require_known)]
     for resource in _RESOURCES:

@@ -5,7 +5,7 @@ import contextlib
 from dataclasses import asdict
 from typing import Any
 
-from fastapi import APIRouter, status
+from fastapi import APIRouter, Request, status
 
 from transientcam.cli.devices import cameras_here
 from transientcam.cli.findings import guarded
@@ -18,8 +18,10 @@ from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.camera import CameraDocument
 from transientcam_server.api._documents.choices import CameraChangeDocument, CameraChoicesDocument
 from transientcam_server.api._problems import documented
+from transientcam_server.api._shared_answer import SharedAnswer
 from transientcam_server.errors import kinds
 from transientcam_server.relay import RelayCamera
+from transientcam_server.settings import Settings
 
 router = APIRouter(tags=["camera"])
 
@@ -47,18 +49,25 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
     )
 
 
+def choices(settings: Settings) -> CameraChoicesDocument:
+    """Look for cameras; also on the network, unless the settings keep away from that."""
+    checked = guarded("USB", checks)
+    return CameraChoicesDocument(
+        current=settings.camera,
+        missing=[each.to_document() for each in checked if each.level != "ok"],
+        **cameras_here(network=settings.announce != "off"),
+    )
+
+
 @router.get("/camera/choices", summary="Cameras to choose from")
-async def read_choices(service: ServiceOf) -> CameraChoicesDocument:
+async def read_choices(request: Request) -> CameraChoicesDocument:
     """Look for cameras at this machine and on the network, which takes about a second.
 
-    Services of other cameras are in `GET /cameras`.
+    Requests that come meanwhile get the same answer. Services of other cameras are in `GET
+    /cameras`.
     """
-    checked = await asyncio.to_thread(lambda: list(guarded("USB", checks)))
-    return CameraChoicesDocument(
-        current=service.settings.camera,
-        missing=[each.to_document() for each in checked if each.level != "ok"],
-        **await asyncio.to_thread(cameras_here, network=True),
-    )
+    shared: SharedAnswer[CameraChoicesDocument] = request.app.state.choices
+    return await shared.get()
 
 
 @router.put(
