@@ -218,10 +218,13 @@ def serve_app(
     give_back_large_blocks()
     server = Server(app, settings, on_listening=on_listening)
     server.run(sockets=[listener.dup()])  # it closes what it is given
+    service: Service = app.state.service
+    successor = service.successor
+    if server.signals and successor is not None:
+        successor[1].close()
     if signal.SIGINT in server.signals:
         raise KeyboardInterrupt
-    service: Service = app.state.service
-    return None if server.signals else service.successor
+    return None if server.signals else successor
 
 
 def freeze_startup_objects(compiling: threading.Thread | None) -> threading.Thread:
@@ -229,6 +232,7 @@ def freeze_startup_objects(compiling: threading.Thread | None) -> threading.Thre
 
     Returns the thread that waits for it.
     """
+    gc.unfreeze()  # of the camera before
     _freeze()
 
     def wait() -> None:
@@ -242,7 +246,6 @@ def freeze_startup_objects(compiling: threading.Thread | None) -> threading.Thre
 
 
 def _freeze() -> None:
-    gc.unfreeze()  # of the camera before
     gc.collect()
     gc.freeze()
 
