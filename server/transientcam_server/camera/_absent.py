@@ -8,8 +8,6 @@ from transientcam_driver.clock import RealClock
 
 NO_CAMERA: Final = "none"
 """The name that stands for it."""
-_LIMITS: Final = {"min_frequency_hz": 1e6, "max_frequency_hz": 1e8, "tuning_step_hz": 1.0}
-_LIMITS_S: Final = {"min_exposure_s": 1e-6, "max_exposure_s": 1.0, "readout_s": 0.0}
 
 
 class CameraAbsent(CameraLost):
@@ -29,10 +27,11 @@ class AbsentCamera(HostCamera):
     def __init__(self, reason: str = "no camera is chosen", *, wanted: str | None = None) -> None:
         super().__init__(RealClock(), None)
         self._reason, self._wanted = reason, wanted
-        named = {"model": NO_CAMERA, "serial": "", "firmware": "", "protocol_version": 0}
-        size = {"width": 1, "height": 1, "bits": 16, "max_harmonics": 12}
-        limits = {**_LIMITS, **_LIMITS_S, "streaming_readout_s": 0.0}
-        self._capabilities = Capabilities(**named, **size, **limits)  # type: ignore[arg-type]
+        self._capabilities = Capabilities(
+            model=NO_CAMERA, serial="", firmware="", protocol_version=0, width=1, height=1, bits=16,
+            max_harmonics=12, min_frequency_hz=1e6, max_frequency_hz=1e8, tuning_step_hz=1.0,
+            min_exposure_s=1e-6, max_exposure_s=1.0, readout_s=0.0, streaming_readout_s=0.0,
+        )  # fmt: skip
         self._applied = self._capabilities.apply(self._capabilities.nearest(Sequence()), epoch=1)
 
     @property
