@@ -287,8 +287,10 @@ class Service:
             except DriverError as error:
                 detail = f"{spec} cannot be opened, so that nothing was changed: {error}"
                 raise Problem(kinds.CAMERA_FAILED, detail, field="camera", value=spec) from error
-            await asyncio.to_thread(self.acquisition.stop)
-            self._successor = spec, opened
+            try:
+                await asyncio.to_thread(self.acquisition.stop)
+            finally:  # also where the request is cancelled: this one serves no more
+                self._successor = spec, opened
 
     async def close_streams(self) -> None:
         """Close every stream, and give clients that still read the time to receive the reason."""

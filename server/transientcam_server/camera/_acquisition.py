@@ -96,6 +96,7 @@ class Acquisition:
         self._occupant: str | None = None
         self._restored: Sequence | None = None
         self._stopping = threading.Event()
+        self._ending, self._ended = threading.Lock(), False
         self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
         self._running = True
         self._connected = True
@@ -210,20 +211,29 @@ class Acquisition:
             raise Problem(kinds.CAMERA_BUSY, f"The job {job_id} has the camera.", job=job_id)
 
     def submit(self, command: Callable[[], _T]) -> "Future[_T]":
-        """Run a command between two reads of the camera."""
+        """Run a command between two reads of the camera.
+
+        The future raises Problem ``shutting-down`` where the thread has ended.
+        """
         future: Future[_T] = Future()
 
         def run() -> None:
             if not future.set_running_or_notify_cancel():
                 return
             try:
+                if self._ended:
+                    raise Problem(kinds.SHUTTING_DOWN, "The camera is not served any more.")
                 result = command()
             except Exception as error:
                 future.set_exception(error)
             else:
                 future.set_result(result)
 
-        self._commands.put(run)
+        with self._ending:
+            if not self._ended:
+                self._commands.put(run)
+                return future
+        run()  # no thread would
         return future
 
     def status(self) -> AcquisitionStatus:
@@ -280,6 +290,9 @@ class Acquisition:
                 self._run_commands(wait_s=BACKOFF_S[-1])
         self._run_commands(wait_s=0.0)
         self._switch_off_at_end()
+        with self._ending:
+            self._ended = True
+        self._run_commands(wait_s=0.0)  # what was asked for meanwhile is refused
 
     def _beat(self) -> None:
         """Tell the supervisor that the light is under control, and hear what it has done."""

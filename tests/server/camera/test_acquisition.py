@@ -246,6 +246,22 @@ def test_stopping_stops_the_camera_and_starting_starts_it_again() -> None:
     assert one.camera.calls == ["start", "stop", "start", "safe_off"]
 
 
+def test_what_is_asked_for_once_it_has_ended_is_refused() -> None:
+    with running() as one:
+        ending = threading.Event()
+        one.camera.safe_off = ending.wait  # type: ignore[method-assign, assignment]
+        stopping = threading.Thread(target=one.acquisition.stop)
+        stopping.start()
+        meanwhile = one.acquisition.occupy("job", lambda camera, go_on: None, offs=0)
+        ending.set()
+        stopping.join()
+        after = one.acquisition.submit(lambda: None)
+
+        for refused in (meanwhile, after):
+            with pytest.raises((Problem, JobCancelled)):
+                refused.result(PATIENCE_S)
+
+
 def test_a_loss_is_noticed_while_nothing_is_read() -> None:
     with running() as one:
         one.acquisition.set_running(False).result(PATIENCE_S)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import httpx
 from fastapi import FastAPI
@@ -68,7 +69,8 @@ def staying(app: FastAPI) -> None:
     change = service.change_camera
 
     async def change_and_stay(spec: str) -> None:
-        await change(spec)
+        with mock.patch.object(service.acquisition, "stop"):  # or nothing would be served after it
+            await change(spec)
         assert service.successor is not None
         service.successor[1].close()
         service._successor = None
