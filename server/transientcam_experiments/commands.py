@@ -163,7 +163,8 @@ def tradeoff(
             _capture_on(workers, dask, console, grid, scenes, records, **kept)
         _measure_here(console, points, records, seed=seed)
     except KeyboardInterrupt:
-        interrupted = True
+        # what is in the file, which may have a point that is not in these records yet
+        records, interrupted = experiment.Records(output), True
     written = experiment.report(output, records) if len(records) else []
     if as_json:
         document = {"points": len(records), "written": [str(path) for path in written]}

@@ -100,8 +100,12 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 @pytest.fixture
 def lit(running: Daemon) -> Daemon:
     """The daemon, capturing with the light on."""
-    running.put("acquisition", {"running": True})
-    wait_until(lambda: running.state() == "streaming" and running.camera.lit)
+
+    def lights() -> bool:  # again where a laden machine put it out since
+        running.client.put("/api/v1/acquisition", json={"running": True})
+        return running.state() == "streaming" and running.camera.lit
+
+    wait_until(lights)
     return running
 
 

@@ -127,6 +127,7 @@ def hung(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", httpx.Client
             "STATE_DIRECTORY": str(tmp_path),
             "TRANSIENTCAM_RECORDINGS__MIN_FREE_BYTES": "0",
             "TRANSIENTCAM_RECORDINGS__STALLED_S": "1.0",
+            "TRANSIENTCAM_LIMITS__UNSERVED_S": "60",  # a laden machine would end the capture
         },
     ) as process:
         assert process.stdout is not None
