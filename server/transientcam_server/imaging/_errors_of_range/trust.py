@@ -27,8 +27,9 @@ _Array = NDArray[Any]
 NOISE: Final = 1.5
 """Half width of an interval by noise, in standard deviations; 1.645 hold 90 % of a normal variable,
 and a deviation by draws around what is noisy already is more than it."""
-MODELS: Final = 1.0
-"""The same in deviations between models: two that explain a pixel alike are one from their mean."""
+LATER_SHAPE: Final = 0.5
+"""Times that share of a radian at the highest frequency by which later light moves a range whose
+shape is not known."""
 BIAS: Final = 1.6
 """Times the estimators' disagreement that later light moves a range."""
 LEAST_BIAS: Final = 0.02
@@ -60,9 +61,9 @@ def judged(
 ) -> tuple[_Array, _Array]:  # fmt: skip
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
-    Noise and bias were found in one pixel of ``every_px`` rows and columns. The factors but
-    `MODELS` were chosen on random scenes; ``python -m benchmarks trust`` measures how many pixels
-    are within on others (decision 8).
+    Noise and bias were found in one pixel of ``every_px`` rows and columns. The factors
+    were chosen on random scenes; ``python -m benchmarks trust`` measures how many pixels are within
+    on others (decision 8).
     """
     sequence = recipe.applied.sequence
     range_m = np.where(found.has_range, found.range_m, np.nan).astype(np.float64)
@@ -72,6 +73,8 @@ def judged(
     noise_m = std_m
     if recipe.technique == "likelihood":  # which knows how far other models are from its range
         noise_m = np.fmax(std_m, found.range_std_m)
+    with np.errstate(all="ignore"):
+        later = np.clip(np.asarray(found.indirect) / brightness_dn, 0.0, 1.0)
     # what of the disagreement is noise: it is a median over pixels, which averaging has joined
     joined = np.maximum(_averaged_pixels(found) / every_px**2, 1.0)
     joined = np.minimum(np.pi / 2 * joined / NEIGHBOURS_PX**2, 1.0)
@@ -80,7 +83,7 @@ def judged(
     drift_m = 0.0 if drift is None else drift.range_m
     parts_m = (
         NOISE * std_m,
-        MODELS * np.sqrt(noise_m**2 - std_m**2),
+        LATER_SHAPE * later * length_m,
         BIAS * np.sqrt(np.maximum(bias_m**2 - joined * noise_m**2, 0.0)),
         LEAST_BIAS * length_m,
         _spread_m(recipe, found, range_m),
@@ -91,7 +94,7 @@ def judged(
     flags = np.asarray(found.flags)
     # one frequency knows nothing of later light
     disagree = np.isnan(bias_m) | (bias_m > np.maximum(_UNRESOLVED * length_m, NOISE * std_m))
-    later = np.asarray(found.indirect) > _LATER * brightness_dn
+    resolved = later > _LATER
     nowhere = np.zeros(known.shape, dtype=bool)
     motion = bright = nowhere
     if raw is not None and recipe.sensor is not None:
@@ -109,7 +112,7 @@ def judged(
         Trust.NO_DIRECT_LIGHT: bright,
         Trust.SHADOW: shadow,
         Trust.EDGE: edge,
-        Trust.LATER_LIGHT_UNRESOLVED: (disagree & ~later) | (flags & tm.Flags.UNEXPLAINED > 0),
+        Trust.LATER_LIGHT_UNRESOLVED: (disagree & ~resolved) | (flags & tm.Flags.UNEXPLAINED > 0),
         Trust.LATER_LIGHT: disagree,
         Trust.DRIFT: (flags & tm.Flags.CONTRADICTORY > 0) | (drift_m > FAR_FROM_CALIBRATION_M),
         Trust.NOISE: stray | (std_m > _OPEN * tm.range_m(2 * np.pi, recipe.base_frequency_hz)),
