@@ -27,9 +27,9 @@ _Array = NDArray[Any]
 NOISE: Final = 1.5
 """Half width of an interval by noise, in standard deviations; 1.645 hold 90 % of a normal variable,
 and a deviation by draws around what is noisy already is more than it."""
-LATER_SHAPE: Final = 0.5
-"""Times that share of a radian at the highest frequency by which later light moves a range whose
-shape is not known."""
+TAIL_SHAPE: Final = 0.5
+"""Times the share of a pixel's light that its tail has, of a radian at the highest frequency, by
+which the range is off since no tail has quite the shape of the model's."""
 BIAS: Final = 1.6
 """Times the estimators' disagreement that later light moves a range."""
 LEAST_BIAS: Final = 0.02
@@ -61,20 +61,20 @@ def judged(
 ) -> tuple[_Array, _Array]:  # fmt: skip
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
-    Noise and bias were found in one pixel of ``every_px`` rows and columns. The factors
-    were chosen on random scenes; ``python -m benchmarks trust`` measures how many pixels are within
-    on others (decision 8).
+    Noise and bias were found in one pixel of ``every_px`` rows and columns. The factors were
+    chosen on random scenes; ``python -m benchmarks trust`` measures how many pixels are within on
+    others (decision 8).
     """
     sequence = recipe.applied.sequence
     range_m = np.where(found.has_range, found.range_m, np.nan).astype(np.float64)
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
     length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
-    noise_m = std_m
+    noise_m, tail = std_m, np.zeros_like(range_m)
     if recipe.technique == "likelihood":  # which knows how far other models are from its range
         noise_m = np.fmax(std_m, found.range_std_m)
-    with np.errstate(all="ignore"):
-        later = np.clip(np.asarray(found.indirect) / brightness_dn, 0.0, 1.0)
+        with np.errstate(all="ignore"):
+            tail = np.clip(np.asarray(found.likelihood.tail) / brightness_dn, 0.0, 1.0)
     # what of the disagreement is noise: it is a median over pixels, which averaging has joined
     joined = np.maximum(_averaged_pixels(found) / every_px**2, 1.0)
     joined = np.minimum(np.pi / 2 * joined / NEIGHBOURS_PX**2, 1.0)
@@ -83,7 +83,7 @@ def judged(
     drift_m = 0.0 if drift is None else drift.range_m
     parts_m = (
         NOISE * std_m,
-        LATER_SHAPE * later * length_m,
+        TAIL_SHAPE * tail * length_m,
         BIAS * np.sqrt(np.maximum(bias_m**2 - joined * noise_m**2, 0.0)),
         LEAST_BIAS * length_m,
         _spread_m(recipe, found, range_m),
@@ -94,7 +94,7 @@ def judged(
     flags = np.asarray(found.flags)
     # one frequency knows nothing of later light
     disagree = np.isnan(bias_m) | (bias_m > np.maximum(_UNRESOLVED * length_m, NOISE * std_m))
-    resolved = later > _LATER
+    later = np.asarray(found.indirect) > _LATER * brightness_dn
     nowhere = np.zeros(known.shape, dtype=bool)
     motion = bright = nowhere
     if raw is not None and recipe.sensor is not None:
@@ -112,7 +112,7 @@ def judged(
         Trust.NO_DIRECT_LIGHT: bright,
         Trust.SHADOW: shadow,
         Trust.EDGE: edge,
-        Trust.LATER_LIGHT_UNRESOLVED: (disagree & ~resolved) | (flags & tm.Flags.UNEXPLAINED > 0),
+        Trust.LATER_LIGHT_UNRESOLVED: (disagree & ~later) | (flags & tm.Flags.UNEXPLAINED > 0),
         Trust.LATER_LIGHT: disagree,
         Trust.DRIFT: (flags & tm.Flags.CONTRADICTORY > 0) | (drift_m > FAR_FROM_CALIBRATION_M),
         Trust.NOISE: stray | (std_m > _OPEN * tm.range_m(2 * np.pi, recipe.base_frequency_hz)),
