@@ -173,7 +173,7 @@ def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Arr
         after = np.angle(lowest * np.exp(-1j * first))
     typical_m, pixels = median_around(range_m), _averaged_pixels(found)
     # averaging mixes the ranges of a slope, whose variance loses modulation just as well
-    slope = np.stack(np.gradient(typical_m))
+    slope: _Array = np.array(np.gradient(typical_m))
     slope[np.abs(slope) > MOST_SLOPE * typical_m] = 0.0
     lost -= pixels / (4 * np.pi) * (slope**2).sum(axis=0) / radian_m**2
     with np.errstate(all="ignore"):
