@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -28,6 +29,7 @@ _Array = NDArray[Any]
 _WRONG = 3.0
 """Times its `range_error`, beyond which a range is wrong."""
 BUILT_IN: Final = ("wall", "corner-left")
+AVERAGES: Final = ("gaussian", "edge-preserving")
 
 
 class Judged(NamedTuple):
@@ -40,11 +42,26 @@ class Judged(NamedTuple):
 
 
 def tables(
-    *, scenes: int = 32, seed: int = 42, directory: str = "", built_in: tuple[str, ...] = BUILT_IN
+    *,
+    scenes: int = 32,
+    seed: int = 90817,
+    directory: str = "",
+    built_in: tuple[str, ...] = BUILT_IN,
 ) -> Iterator[Table]:
-    """Judge scenes of a seed, a directory, and built-in ones."""
+    """Judge scenes of a seed, a directory, and built-in ones, by each average over neighbours."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [*worlds.write(Path(folder), scenes, seed=seed)]
+        paths += [str(each) for each in sorted(Path(directory).glob("*.toml")) if directory]
+        names = [Path(path).stem for path in (*paths, *built_in)]
+        found = [judged(path) for path in (*paths, *built_in)]
+    for neighbours in AVERAGES:
+        yield from _tables(neighbours, names, [each[neighbours] for each in found], len(paths))
+
+
+def _tables(neighbours: str, names: list[str], found: list[Judged], others: int) -> Iterator[Table]:
+    """Yield the tables of one average; the first ``others`` scenes are not built in."""
     table = Table(
-        "What pixels say of themselves",
+        f"What pixels say of themselves, averaged {neighbours}",
         heads(
             "scene | no direct light:.1% | median error, mm:.1f | trusted:.1% | median interval, mm"
             ":.1f | in their interval:.1% | of the trusted:.1% | wrong:.1% | of these marked:.1%"
@@ -57,36 +74,35 @@ def tables(
             "is at most 3 times the median error. Mirrors are left out.",
         ],
     )
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [*worlds.write(Path(folder), scenes, seed=seed)]
-        paths += [str(each) for each in sorted(Path(directory).glob("*.toml")) if directory]
-        found = []
-        for path in (*paths, *built_in):
-            found.append(judged(path))
-            table.rows.append((Path(path).stem, *_figures(found[-1])))
-    if not paths:
+    table.rows.extend((name, *_figures(of)) for name, of in zip(names, found, strict=True))
+    if not others:
         yield table
         return
     # a built-in scene is one of a kind: in `corner-left` what shades the lamp leaves no trace
-    together = Judged(*(np.concatenate(parts) for parts in zip(*found[: len(paths)], strict=True)))
+    together = Judged(*(np.concatenate(parts) for parts in zip(*found[:others], strict=True)))
     table.rows.append(("all but the built-in", *_figures(together)))
     yield table
     yield _of_reasons(together)
 
 
-def judged(scene: str) -> Judged:
-    """Capture a frame of a scene with the default sequence."""
+def judged(scene: str) -> dict[str, Judged]:
+    """Capture a frame of a scene with the default sequence, and judge it by each average."""
     with camera_before(scene, seed=CAPTURE_SEED) as camera:
         simulation = camera.simulation
         assert simulation is not None
         recipe = _recipe(camera, simulation)
         (frame,) = capture(camera, 1, middle=True)
-        found = recipe.reconstruct(frame.raw)
-        accuracy: RangeAccuracy = range_accuracy(recipe, found, 1, frame.raw)
-        error_m = np.abs(np.asarray(found.range_m) - frame.truth.range_m)
+    found = {}
+    for neighbours in AVERAGES:
+        settings = SETTINGS.model_copy(update={"neighbours": neighbours})
+        by = replace(recipe, settings=settings)
+        image = by.reconstruct(frame.raw)
+        accuracy: RangeAccuracy = range_accuracy(by, image, 1, frame.raw)
+        error_m = np.abs(np.asarray(image.range_m) - frame.truth.range_m)
         kept = np.isfinite(error_m) & ~_mirrors(scene, error_m.shape)
         planes = error_m, accuracy.error_m, accuracy.trust, frame.truth.direct_share
-        return Judged(*(plane[kept] for plane in planes))
+        found[neighbours] = Judged(*(plane[kept] for plane in planes))
+    return found
 
 
 def _recipe(camera: Camera, simulation: Simulation) -> Recipe:

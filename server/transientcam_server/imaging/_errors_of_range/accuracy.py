@@ -136,7 +136,7 @@ def range_accuracy(
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
     std_m, bias_m = (_around(each, has_range, every_px) for each in (std_m, bias_m))
-    error_m, trust = judged(recipe, found, std_m, bias_m, raw)
+    error_m, trust = judged(recipe, found, std_m, bias_m, raw, every_px)
     return RangeAccuracy(std_m, bias_m, error_m, trust, every_px, not_judged(recipe, raw))
 
 

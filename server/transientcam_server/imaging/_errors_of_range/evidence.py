@@ -25,7 +25,7 @@ _STILL_DEVIATIONS: Final = 2.0
 """Of the typical pixel: more in a pair of images is not motion."""
 _MOVED_SHARE: Final = 0.02
 """Least change of a pixel's light that is motion: what no rounding or imperfect phase explains."""
-_STEP: Final = 0.05
+STEP: Final = 0.05
 """Of the range, above which neighbours are not of one surface."""
 _STEP_DEVIATIONS: Final = 8.0
 _DIM: Final = 0.5
@@ -57,12 +57,16 @@ def median_around(plane: _Array, step_px: int = 1) -> _Array:
     return np.nan_to_num(found)
 
 
-def mean_alike(plane: _Array, range_m: _Array, step_px: int) -> _Array:
-    """Return the mean (H, W) of the pixels so many steps apart that are about as far; 0 of none."""
+def mean_alike(plane: _Array, range_m: _Array, step_px: int) -> tuple[_Array, _Array]:
+    """Return the mean (H, W) of the pixels so many steps apart that are about as far; 0 of none.
+
+    And their share of all.
+    """
     values, others_m = around(plane, step_px=step_px), around(range_m, step_px=step_px)
     own_m = range_m[..., None]
-    alike = np.isfinite(values) & (np.abs(others_m - own_m) < _STEP * own_m)
-    return np.asarray(np.where(alike, values, 0.0).sum(-1) / np.maximum(alike.sum(-1), 1))
+    alike = np.isfinite(values) & (np.abs(others_m - own_m) < STEP * own_m)
+    mean = np.where(alike, values, 0.0).sum(-1) / np.maximum(alike.sum(-1), 1)
+    return np.asarray(mean), np.asarray(alike.mean(axis=-1))
 
 
 def spread(values: _Array) -> _Array:
@@ -121,7 +125,7 @@ def edges_and_strays(
     Near and far meet where the median range has a step, and in dim pixels beside a step or pixels
     without a range: what is bright there shines into them.
     """
-    step_m = np.maximum(_STEP * range_m, _STEP_DEVIATIONS * median_around(std_m))
+    step_m = np.maximum(STEP * range_m, _STEP_DEVIATIONS * median_around(std_m))
     known = np.isfinite(range_m)
     typical_m = np.where(known, median_around(range_m), np.nan)
     light = around(np.where(known, brightness_dn, np.nan))

@@ -9,7 +9,9 @@ import transientcam_moments as tm
 from transientcam.wire import Trust
 from transientcam_driver import RawFrame
 from transientcam_driver.calibration import TemperatureDrift
+from transientcam_moments.images import gaussian_taps
 from transientcam_server.imaging._errors_of_range.evidence import (
+    NEIGHBOURS_PX,
     SHADOW,
     brighter_than_white,
     edges_and_strays,
@@ -18,28 +20,31 @@ from transientcam_server.imaging._errors_of_range.evidence import (
     moved,
     shadowed,
 )
+from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _Array = NDArray[Any]
 NOISE: Final = 1.5
 """Half width of an interval by noise, in standard deviations; 1.645 hold 90 % of a normal variable,
-and the larger of two estimates of the deviation is more than it."""
-BIAS: Final = 2.0
-NOISE_IN_BIAS: Final = 0.5
-"""Times the estimators' disagreement that later light moves a range; what of that is noise."""
+and a deviation by draws around what is noisy already is more than it."""
+TAIL_SHAPE: Final = 0.5
+"""Times the share of a pixel's light that its tail has, of a radian at the highest frequency, by
+which the range is off since no tail has quite the shape of the model's."""
+BIAS: Final = 1.6
+"""Times the estimators' disagreement that later light moves a range."""
 LEAST_BIAS: Final = 0.02
 """Of the range of a radian at the highest frequency, by which later light may move a range that
 nothing shows."""
-SPREAD: Final = 1.05
-"""Times how much nearer the first light may be by how light is seen to be spread."""
 LEAST_LOSS: Final = 0.002
-NOISE_IN_LOSS: Final = 0.25
-"""Twice the lost modulation that may be none, without noise; how much noise adds to it."""
+"""Twice the lost modulation that may be none, without noise."""
 TAIL_SKEW: Final = 2.0
 """Skewness of an exponential decay, whose light comes as long after its begin as it is spread."""
 LEAST_SKEW: Final = 2e-4
-NOISE_IN_SKEW: Final = 0.15
-"""Third cumulant in cubic radians that may be none, without noise; how much noise adds to it."""
+"""Third cumulant in cubic radians that may be none, without noise."""
+MOST_SLOPE: Final = 0.02
+"""Of the range a pixel: what is steeper is no surface."""
+LOSS_ERRORS, SKEW_ERRORS = 1.5, 1.3
+"""Standard errors of them over a surface that are none of them, either."""
 FAR_FROM_CALIBRATION_M: Final = 0.015
 """A camera whose temperature may move ranges by more is not the one that was calibrated."""
 _UNRESOLVED: Final = 0.5
@@ -51,29 +56,37 @@ _OPEN: Final = 0.05
 
 
 def judged(
-    recipe: Recipe, found: tm.Reconstruction, std_m: _Array, bias_m: _Array, raw: RawFrame | None
-) -> tuple[_Array, _Array]:
+    recipe: Recipe, found: tm.Reconstruction, std_m: _Array, bias_m: _Array,
+    raw: RawFrame | None, every_px: int = 1,
+) -> tuple[_Array, _Array]:  # fmt: skip
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
-    The factors from `NOISE` to `NOISE_IN_SKEW` were chosen on random scenes of two seeds;
-    ``python -m benchmarks trust`` measures how many pixels are within on others (decision 8).
+    Noise and bias were found in one pixel of ``every_px`` rows and columns. The factors were
+    chosen on random scenes; ``python -m benchmarks trust`` measures how many pixels are within on
+    others (decision 8).
     """
     sequence = recipe.applied.sequence
     range_m = np.where(found.has_range, found.range_m, np.nan).astype(np.float64)
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
     length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
-    noise_m = std_m
+    noise_m, tail = std_m, np.zeros_like(range_m)
     if recipe.technique == "likelihood":  # which knows how far other models are from its range
         noise_m = np.fmax(std_m, found.range_std_m)
+        with np.errstate(all="ignore"):
+            tail = np.clip(np.asarray(found.likelihood.tail) / brightness_dn, 0.0, 1.0)
+    # what of the disagreement is noise: it is a median over pixels, which averaging has joined
+    joined = np.maximum(_averaged_pixels(found) / every_px**2, 1.0)
+    joined = np.minimum(np.pi / 2 * joined / NEIGHBOURS_PX**2, 1.0)
     then_c = None if recipe.gains is None else recipe.gains.temperature_c
     drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
     drift_m = 0.0 if drift is None else drift.range_m
     parts_m = (
-        NOISE * noise_m,
-        BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * noise_m) ** 2, 0.0)),
+        NOISE * std_m,
+        TAIL_SHAPE * tail * length_m,
+        BIAS * np.sqrt(np.maximum(bias_m**2 - joined * noise_m**2, 0.0)),
         LEAST_BIAS * length_m,
-        SPREAD * _spread_m(recipe, found, range_m),
+        _spread_m(recipe, found, range_m),
         drift_m,
     )
     error_m = np.sqrt(sum(np.square(part) for part in parts_m))
@@ -122,6 +135,14 @@ def not_judged(recipe: Recipe, raw: RawFrame | None) -> tuple[str, ...]:
     return tuple(reason.name.lower() for reason, missing in unknown.items() if missing)
 
 
+def _averaged_pixels(found: tm.Reconstruction) -> _Array | float:
+    """Return of how many pixels (H, W) the moments of each are the mean: one over what is left."""
+    if found.settings.neighbours != "edge-preserving" or found.variance_share is None:
+        return float((gaussian_taps(found.settings.gaussian_px) ** 2).sum()) ** -2
+    frames = 1 if found.frames_averaged is None else found.frames_averaged
+    return np.asarray(1 / (found.variance_share * frames))
+
+
 def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
     """Return how much nearer (H, W) than its range a pixel's first light may be, by its spread.
 
@@ -150,20 +171,31 @@ def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Arr
         lost = (1.0 - np.abs(highest) / np.abs(lowest)) * 2.0 / (m**2 - 1)
         early = np.angle((lowest / np.abs(lowest)) ** m * np.conj(highest)) * 6.0 / (m**3 - m)
         after = np.angle(lowest * np.exp(-1j * first))
-    typical_m = median_around(range_m)
-    (square, unsure), (cube, unsure_cube), (after, _) = (
-        _typical(plane, typical_m) for plane in (lost, early, after)
+    typical_m, pixels = median_around(range_m), _averaged_pixels(found)
+    # averaging mixes the ranges of a slope, whose variance loses modulation just as well
+    slope: _Array = np.array(np.gradient(typical_m))
+    slope[np.abs(slope) > MOST_SLOPE * typical_m] = 0.0
+    lost -= pixels / (4 * np.pi) * (slope**2).sum(axis=0) / radian_m**2
+    with np.errstate(all="ignore"):
+        noise = moment_noise(recipe, found).variance
+        off = pixels * sum(noise[at] / np.abs(found.smoothed[at]) ** 2 for at in (1, -1))
+    telling = np.isfinite(range_m) & (off < 1.0)
+    (square, of_pixels), (cube, _), (after, _), (off, _) = (
+        _typical(np.where(telling, plane, np.nan), typical_m) for plane in (lost, early, after, off)
     )
+    # the median over neighbours has pi / 2 times the variance of their mean
+    unsure = np.sqrt(np.pi / 2 * off / np.maximum(of_pixels, 1.0))
     square = np.clip(square, 0.0, 1.0)
-    none = (NOISE_IN_LOSS * unsure) ** 4 + (LEAST_LOSS / m**2) ** 4
+    none = (LOSS_ERRORS * unsure * 2.0 / (m**2 - 1)) ** 4 + (LEAST_LOSS / m**2) ** 4
     spread = np.sqrt(square * square**4 / (square**4 + none))
-    skew = np.maximum(cube - NOISE_IN_SKEW * unsure_cube - LEAST_SKEW, 1e-12)
+    unsure *= 6.0 * np.sqrt((m**2 + 1) / 2) / (m**3 - m)
+    skew = np.maximum(cube - SKEW_ERRORS * unsure - LEAST_SKEW, 1e-12)
     before = np.minimum(spread, TAIL_SKEW * spread**4 / skew)
     return np.asarray(np.maximum(before - after, 0.0) * radian_m)
 
 
 def _typical(plane: _Array, range_m: _Array) -> tuple[_Array, _Array]:
-    """Return the mean (H, W) over 53 x 53 pixels of a surface, and by how much one pixel is off."""
-    near = median_around(plane)
-    far_off = median_around(np.abs(plane - near))
-    return mean_alike(mean_alike(near, range_m, 2), range_m, 10), far_off
+    """Return the mean (H, W) over 53 x 53 pixels of a surface, and of how many pixels it is."""
+    near, alike = mean_alike(median_around(plane), range_m, 2)
+    mean, all_alike = mean_alike(near, range_m, 10)
+    return mean, 53**2 * alike * all_alike

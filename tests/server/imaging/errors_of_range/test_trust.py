@@ -32,14 +32,17 @@ def applied() -> AppliedSequence:
 APPLIED = applied()
 RECIPE = Recipe(
     APPLIED,
-    ReconstructionSettings(estimator="pisarenko"),
+    ReconstructionSettings(estimator="pisarenko", neighbours="gaussian"),
     4095.0,
     sensor=tm.noise.Sensor(),
 )
 
 
 def found(
-    range_m: Array, light_dn: Array, later: tuple[float, float] = (0.0, 0.0)
+    range_m: Array,
+    light_dn: Array,
+    later: tuple[float, float] = (0.0, 0.0),
+    recipe: Recipe = RECIPE,
 ) -> tm.Reconstruction:
     """The reconstruction of a return at a range, and of a later one: its share, and how far."""
     share, after_m = later
@@ -47,7 +50,7 @@ def found(
     even = 0.01
     b = (1 - share - even) * np.exp(1j * j * METRES * range_m)
     b = b + share * np.exp(1j * j * METRES * (range_m + after_m)) + even * (j == 0)
-    return RECIPE._reconstructor(tm.Measured((light_dn * b).astype(np.complex64)))
+    return recipe._reconstructor(tm.Measured((light_dn * b).astype(np.complex64)))
 
 
 def trust_of(
@@ -120,7 +123,7 @@ def test_estimators_that_disagree_by_much_leave_later_light_open(
     error_m, trust = trust_of(RECIPE, image, bias_m=0.2)
 
     assert (trust == reason).all()
-    assert (error_m >= 2 * 0.2).all()
+    assert (error_m >= 1.6 * 0.2).all()
 
 
 @pytest.mark.parametrize("estimator", ["likelihood", "pisarenko"])
@@ -151,6 +154,51 @@ def test_light_that_is_spread_by_less_than_any_return_resolves_may_have_begun_ea
     # of a room, models with and without a return at its beginning spread
     widest = 1.6 if kind == "room" else 1.3
     assert np.median(off_m) < 1.1 * np.median(error_m) < widest * late
+
+
+def test_half_of_what_a_tail_moves_the_highest_frequency_is_in_the_interval() -> None:
+    """Of the light 30 % come after the rest, 1 m later in the mean, falling exponentially."""
+    settings = ReconstructionSettings(estimator="likelihood", neighbours="gaussian")
+    recipe = replace(RECIPE, settings=settings)
+    j = np.arange(M + 1).reshape(-1, 1, 1)
+    b = (0.7 + 0.3 / (1 - 1j * j * METRES)) * np.exp(1j * j * METRES * np.full(SHAPE, 2.0))
+    image = recipe._reconstructor(tm.Measured((500.0 * b).astype(np.complex64)))
+
+    error_m, _ = trust_of(recipe, image)
+
+    assert np.median(image.likelihood.tail / image.brightness) == pytest.approx(0.3, abs=0.1)
+    assert 0.3 / 2 / METRES / M < np.median(error_m) / 0.9 < 2 * 0.3 / METRES / M
+
+
+KEEPING_EDGES = replace(
+    RECIPE,
+    settings=ReconstructionSettings(estimator="likelihood", neighbours="edge-preserving"),
+)
+
+
+def test_a_slope_that_averaging_mixes_is_no_light_that_is_spread() -> None:
+    """8 mm a pixel have a deviation of 17 mm over the pixels averaged, as of spread light."""
+    light_dn, columns = np.full(SHAPE, 500.0), np.arange(SHAPE[1])
+
+    def error_m(slope_m: float) -> float:
+        image = found(2.0 + slope_m * columns + np.zeros(SHAPE), light_dn, recipe=KEEPING_EDGES)
+        assert image.variance_share is not None
+        assert np.median(image.variance_share) < 0.03
+        return float(np.median(trust_of(KEEPING_EDGES, image)[0][6:-6, 6:-6]))
+
+    assert error_m(8e-3) < 1.2 * error_m(0.0)
+
+
+def test_estimators_that_disagree_by_the_noise_that_neighbours_share_show_no_bias() -> None:
+    wall = np.full(SHAPE, 2.0), np.full(SHAPE, 500.0)
+
+    def error_m(recipe: Recipe, bias_m: float) -> Array:
+        return trust_of(recipe, found(*wall, recipe=recipe), bias_m=bias_m)[0]
+
+    # of 25 pixels with noise of their own the median would have less of it
+    assert (error_m(RECIPE, 1e-3) > error_m(RECIPE, 0.0)).all()
+    np.testing.assert_array_equal(error_m(KEEPING_EDGES, 1e-3), error_m(KEEPING_EDGES, 0.0))
+    assert (error_m(KEEPING_EDGES, 3e-3) > error_m(KEEPING_EDGES, 0.0)).all()
 
 
 def capture(temperature_c: float) -> RawFrame:
