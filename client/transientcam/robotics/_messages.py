@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam.wire import PRODUCTS
+from transientcam.wire import Product
 
 CAMERA_FRAME: Final = "camera_link"
 """x where the camera looks, y left, z up, in m."""
@@ -160,12 +160,10 @@ class Transform:
 Message = Image | Points | Calibration | Transform
 
 
-def viewable(product: str) -> bool:
+def viewable(product: Product) -> bool:
     """Return whether a product can be sent: images, raw images and points."""
-    known = PRODUCTS.get(product)
-    return known is not None and (
-        product in ("raw", "pointcloud") or (known.axes == ("y", "x") and known.dtype in _ENCODINGS)
-    )
+    image = product.axes == ("y", "x") and product.dtype in _ENCODINGS
+    return image or product.name in ("raw", "pointcloud")
 
 
 def topics_of(product: str) -> dict[str, type[Message]]:
