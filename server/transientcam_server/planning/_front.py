@@ -18,10 +18,15 @@ _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the
 _KEPT: Final = 8
 
 
-def front_goal(by: str, share: float | None = None, region: Region | None = None) -> Goal:
+def front_goal(
+    by: str,
+    share: float | None = None,
+    region: Region | None = None,
+    estimator: str | None = None,
+) -> Goal:
     """Return the goal that a front is compared by: all sequences reach it."""
     target: dict[str, Any] = {} if by == "range_error_m" else {by: _WIDE}
-    return Goal(share=share, region=region, **target)
+    return Goal(share=share, region=region, estimator=estimator, **target)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Estimators and products of other packages: offered everywhere, and no harm to others."""
 
+import json
 import sys
 import threading
 from collections.abc import Iterator
@@ -273,6 +274,46 @@ def test_a_recording_has_their_products(tmp_path: Path, capsys: pytest.CaptureFi
     assert np.array_equal(np.frombuffer(image.data, "<f4"), from_file.ravel(), equal_nan=True)
     assert command([*asked[:-1], "missing"]) != 0
     assert "package_that_is_not_there" in capsys.readouterr().err
+
+
+def test_plans_predict_with_it_what_captures_show() -> None:
+    """The oracle draws images of a sensor's data sheet, and makes moments of them by hand."""
+    fixed: dict[str, Any] = {"harmonics": 3, "base_frequency_hz": 20e6, "zeroth": "estimated"}
+    fixed |= {"exposure_s": 5e-4, "takes": 1, "sub_phases": {"scheme": "none"}}
+    sheet = {"gain_e_per_dn": 9.0, "read_noise_e": 30.0}
+    given = {"brightness_dn_per_s": 2e6, "returns": [{"range_m": 2.0}]}
+    wanted: dict[str, Any] = {"budget": {"capture_s": 1.0}, "fixed": fixed, "scene": given}
+    with serving("sim:wall", sensor=sheet) as served, Camera(served.url, timeout_s=600.0) as camera:
+        camera.reconstruction = {"neighbours": "none"}
+        plan = camera.plan(**wanted, estimator="matched-filter")
+        problems = []
+        for name in ("raises", "absent", "nonsense"):
+            with pytest.raises(ProblemError) as refused:
+                camera.plan(**wanted, estimator=name)
+            problems.append((refused.value.status, refused.value.document["field"]))
+    random, j = np.random.default_rng(5), np.arange(1, 4)[:, None, None]
+    phase_rad = np.pi / 2 * np.arange(4)[:, None]
+    seen = np.exp(4j * np.pi * 20e6 * j * 2.0 / 299_792_458.0 - 1j * phase_rad)
+    light_dn = np.broadcast_to(1000.0 * (1 + seen.real) / 2, (3, 4, 4000))
+    noise_dn = np.sqrt(light_dn / 9.0 + (30.0 / 9.0) ** 2 + 1 / 12)
+    images = light_dn + noise_dn * random.standard_normal(light_dn.shape)
+    b = np.concatenate([np.full((1, 4000), 1000.0), (images * np.exp(1j * phase_rad)).sum(axis=1)])
+    range_m = tm.range_m(comparisons.technique_of("matched-filter").of(b).first_phase_rad(), 20e6)
+    assert plan["estimator"] == "matched-filter"
+    predicted = plan["predicted"]["range_std_m"]["median"]
+    assert predicted == pytest.approx(np.std(range_m), rel=0.1)
+    assert problems == [(409, "estimator"), (409, "estimator"), (422, "estimator")]
+
+
+def test_a_front_is_of_the_estimator_that_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = ["--brightness-dn-per-s", "1e6", "--front", "--json"]
+
+    assert command(["plan", *scene, "--estimator", "matched-filter"]) == 0, capsys.readouterr().err
+
+    found = json.loads(capsys.readouterr().out)
+    assert {each["estimator"] for each in found["front"] + found["lines"]} == {"matched-filter"}
+    assert command(["plan", *scene, "--estimator", "nonsense"]) == 2
+    assert "matched-filter" in capsys.readouterr().err
 
 
 def test_the_doctor_says_which_can_be_used() -> None:
