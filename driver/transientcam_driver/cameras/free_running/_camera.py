@@ -92,7 +92,8 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         about = self._device.description
         self._renderer = Renderer(about)
         self._capabilities = capabilities_of(about, self._renderer)
-        self.factory = FactoryCalibration(self._renderer.gains, about.lens, self._renderer.sensor)
+        made = self._renderer
+        self.factory = FactoryCalibration(made.gains, about.lens, made.sensor, about.extrinsics)
 
     @property
     def off_switch(self) -> OffSwitch:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import Lens, Sensor
+from transientcam_driver.camera import Extrinsics, Lens, Sensor
 from transientcam_driver.errors import ProtocolError
 
 
@@ -77,6 +77,7 @@ class Description:
     `Exposure` leave; None where that is not known.
     ``max_range_m``: needed where frequencies have no base whose multiples are 32 or less.
     ``min_exposure_s``, ``max_exposure_s``: where the exposure can be set.
+    ``extrinsics``: where the sensor is mounted, where the device knows.
     ``clock``, ``heartbeat_s``: as of `Capabilities`.
     """
 
@@ -91,6 +92,7 @@ class Description:
     sensor: Sensor | None = None
     max_range_m: float | None = None
     lens: Lens | None = None
+    extrinsics: Extrinsics | None = None
     clock: Literal["device", "ptp"] = "device"
     heartbeat_s: float = 0.0
     min_exposure_s: float | None = None

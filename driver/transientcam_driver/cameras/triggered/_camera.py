@@ -75,7 +75,8 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
         self._capabilities = self._device.capabilities
         width, height = self._capabilities.width, self._capabilities.height
         lens = None if self.simulation is None else self.simulation.lens(width=width, height=height)
-        self.factory = None if lens is None else FactoryCalibration(lens=lens)
+        stated = getattr(self._device, "factory", None)
+        self.factory = stated if lens is None else FactoryCalibration(lens=lens)
 
     @property
     def off_switch(self) -> OffSwitch:

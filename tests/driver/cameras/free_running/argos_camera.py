@@ -97,7 +97,7 @@ class Device:
         self._counter += (counter - self._counter) % 2**16
         self._time_us += (time_us - self._time_us) % 2**32
         self._images = self._images if turn else []
-        self._images += np.frombuffer(data[64:], "<u2").reshape(4, HEIGHT, WIDTH)
+        self._images.extend(np.frombuffer(data[64:], "<u2").reshape(4, HEIGHT, WIDTH))
         if turn < 2 or len(self._images) < len(MEASURED):
             return None
         begun_s = self._time_us * 1e-6 - 2 / 3 / RATE_HZ
