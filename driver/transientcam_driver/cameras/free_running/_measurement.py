@@ -1,6 +1,7 @@
 """What a camera that runs by itself measures: raw exposures, complex moments, and its frames."""
 
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -64,6 +65,10 @@ class Capture:
     device_time_s: float
     temperature_c: float | None = None
     capture_s: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a number that is not whole (TypeError); one of NumPy would overflow."""
+        object.__setattr__(self, "number", operator.index(self.number))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
