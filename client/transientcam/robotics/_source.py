@@ -33,10 +33,9 @@ def require_viewable(camera: Camera, products: Iterable[str], *others: str) -> N
     """
     known = dict(PRODUCTS)
     if not known.keys() >= {*products} - {*others}:
-        names = "name", "unit", "axes", "dtype", "summary"
         for each in camera.info["products"]:
-            stated = {name: each[name] for name in names} | {"axes": tuple(each["axes"])}
-            known[each["name"]] = Product(**stated)
+            stated = each["unit"], tuple(each["axes"]), each["dtype"], each["summary"]
+            known[each["name"]] = Product(each["name"], *stated)
     can_be_sent = [name for name, each in known.items() if viewable(each) and name != "raw"]
     for name in products:
         if name not in (*can_be_sent, *others):

@@ -103,6 +103,9 @@ def test_ros_2_gets_the_same_transforms_as_foxglove() -> None:
     assert (place.x, place.y, place.z) == (1.0, 2.0, 3.0)
 
 
+GOOD: dict[str, Any] = {"parent": "base_link"}
+
+
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
@@ -115,7 +118,7 @@ def test_ros_2_gets_the_same_transforms_as_foxglove() -> None:
 )
 def test_what_is_no_pose_is_refused_by_name(wrong: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=rf"{named}=.* has no name"):
-        Extrinsics(**({"parent": "base_link"} | wrong))
+        Extrinsics(**{**GOOD, **wrong})
 
 
 @pytest.mark.parametrize("clause", CLAUSES, ids=lambda each: each.name)

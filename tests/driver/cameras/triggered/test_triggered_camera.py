@@ -159,11 +159,14 @@ def test_a_camera_whose_images_never_come_is_lost_with_the_reason() -> None:
         assert camera.read_frame().lost_images == 20
 
 
+ODD: dict[str, object] = {}
+
+
 @pytest.mark.parametrize(
     ("returned", "reason"),
     [
         (lambda: np.zeros((4, 2, 2), np.uint16), "5 times in a row .* does not fit: shape"),
-        (lambda: {}["lut"], r"receive\(\) raised KeyError\('lut'\)"),
+        (lambda: ODD["lut"], r"receive\(\) raised KeyError\('lut'\)"),
     ],
 )
 def test_a_device_that_returns_or_raises_something_else_is_lost_with_the_reason(

@@ -294,7 +294,7 @@ def test_plans_predict_with_it_what_captures_show() -> None:
     random, j = np.random.default_rng(5), np.arange(1, 4)[:, None, None]
     phase_rad = np.pi / 2 * np.arange(4)[:, None]
     seen = np.exp(4j * np.pi * 20e6 * j * 2.0 / 299_792_458.0 - 1j * phase_rad)
-    light_dn = np.broadcast_to(1000.0 * (1 + seen.real) / 2, (3, 4, 4000))
+    light_dn = np.broadcast_to(1000.0 * (1 + np.real(seen)) / 2, (3, 4, 4000))
     noise_dn = np.sqrt(light_dn / 9.0 + (30.0 / 9.0) ** 2 + 1 / 12)
     images = light_dn + noise_dn * random.standard_normal(light_dn.shape)
     b = np.concatenate([np.full((1, 4000), 1000.0), (images * np.exp(1j * phase_rad)).sum(axis=1)])
