@@ -164,12 +164,12 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes, _Lease, _Stream]):
         """
         return self._ask(planning.plan_map(job_id, form))
 
-    def tradeoff(self, by: str = "range_error_m") -> _Document:
+    def tradeoff(self, by: str = "range_error_m", *, estimator: str | None = None) -> _Document:
         """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
-        return self._ask(planning.tradeoff(by))
+        return self._ask(planning.tradeoff(by=by, estimator=estimator))
 
     def start_tradeoff(self, by: str = "range_error_m", **more: Any) -> _Document:
-        """Begin what `tradeoff` returns as a job, for a ``share`` and a ``region``, too."""
+        """Begin what `tradeoff` returns as a job; also for ``share``, ``region``, ``estimator``."""
         return self._ask(planning.start_tradeoff(by=by, **more))
 
     def start_series(

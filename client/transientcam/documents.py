@@ -3,6 +3,7 @@
 The service describes its interface by these fields and their descriptions.
 """
 
+from collections.abc import Sequence
 from typing import Literal
 
 from typing_extensions import TypedDict  # that of Python 3.11 does not tell its fields to pydantic
@@ -108,6 +109,15 @@ class HopDocument(TypedDict):
     """Frames that the service before had and this relay never got, since it began."""
 
 
+class ExtrinsicsDocument(TypedDict):
+    """Where the sensor is in the frame ``parent``: its points p are at R p + t there."""
+
+    parent: str
+    rotation_xyzw: Sequence[float]
+    """R, a unit quaternion; x right, y down, z where the camera looks."""
+    translation_m: Sequence[float]
+
+
 class FrameDocument(TypedDict):
     """What is known of a frame, whatever product of it is fetched."""
 
@@ -139,6 +149,8 @@ class FrameDocument(TypedDict):
     takes: int
     width: int
     height: int
+    extrinsics: ExtrinsicsDocument | None
+    """Null where the camera does not say where it is mounted."""
     temperature_c: float | None
     """Of the sensor; null where the camera knows none."""
     lost_images: int

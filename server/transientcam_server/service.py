@@ -344,6 +344,7 @@ class Service:
             width=width,
             height=height,
             reported=None if camera.factory is None else camera.factory.lens,
+            mounted=None if camera.factory is None else camera.factory.extrinsics,
             scene=None if simulation is None else simulation.lens(width=width, height=height),
             recorded=camera.intrinsics if isinstance(camera, ReplayCamera) else None,
             relayed=None if self.relay is None else self.relay.origin.intrinsics,

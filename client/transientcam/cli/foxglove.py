@@ -17,8 +17,8 @@ def foxglove(
     products: Annotated[
         list[str] | None,
         typer.Argument(
-            help="What can be looked at; range, direct, indirect, brightness and pointcloud, if "
-            "nothing is named."
+            help="What can be looked at, maps of other packages, too; range, direct, indirect, "
+            "brightness and pointcloud, if nothing is named."
         ),
     ] = None,
     host: Annotated[

@@ -28,9 +28,9 @@ def plan_map(job_id: str, form: str) -> Request[bytes]:
     )
 
 
-def tradeoff(by: str) -> Request[dict[str, Any]]:
+def tradeoff(**parts: Any) -> Request[dict[str, Any]]:
     """Build the request for all sequences that no other beats."""
-    return document("tradeoff", params=[("by", by)], extra_timeout_s=_PLANNED_S)
+    return document("tradeoff", params=[*_body(parts).items()], extra_timeout_s=_PLANNED_S)
 
 
 def start_tradeoff(**parts: Any) -> Request[dict[str, Any]]:

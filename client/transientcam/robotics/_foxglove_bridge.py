@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from transientcam.admission import Admission
 from transientcam.camera import Camera
-from transientcam.errors import ParameterError
 from transientcam.frame import Frame
 from transientcam.robotics._controls import Controls
 from transientcam.robotics._foxglove_messages import encode, schema_of
@@ -25,13 +24,12 @@ from transientcam.robotics._messages import (
     messages_of,
     products_of,
     topics_of,
-    viewable,
 )
 from transientcam.robotics._reports import Report
-from transientcam.robotics._source import Source, captured_s
+from transientcam.robotics._source import Source, captured_s, require_viewable
 from transientcam.robotics._viewer_server import ViewerServer
 from transientcam.robotics._watching import SERVICES, Watching
-from transientcam.wire import PRODUCTS, Notice
+from transientcam.wire import Notice
 
 SHOWN: Final = ("range", "direct", "indirect", "brightness", "pointcloud")
 """Products that viewers can choose from, if nothing else is said."""
@@ -89,10 +87,7 @@ class FoxgloveBridge:
         on_report: Callable[[Report], object] = lambda report: None,
         now_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        can_be_shown = [name for name in PRODUCTS if viewable(name) and name != "raw"]
-        for name in products:
-            if name not in can_be_shown:
-                raise ParameterError("products", name, f"some of {', '.join(can_be_shown)}")
+        require_viewable(camera, products)
         self._max_rate_hz = max_rate_hz
         self._now_ns = now_ns
         controls = Controls(

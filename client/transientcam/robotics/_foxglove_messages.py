@@ -20,7 +20,6 @@ from foxglove.messages import (
 )
 
 from transientcam.robotics._messages import (
-    CAMERA_FRAME,
     OPTICAL_FRAME,
     Calibration,
     Image,
@@ -117,12 +116,14 @@ def _calibration(message: Calibration, stamp: Timestamp) -> CameraCalibration:
 
 
 def _transform(message: Transform, stamp: Timestamp) -> FrameTransforms:
-    x, y, z, w = message.rotation_xyzw
-    transform = FrameTransform(
-        timestamp=stamp,
-        parent_frame_id=CAMERA_FRAME,
-        child_frame_id=OPTICAL_FRAME,
-        translation=Vector3(x=0.0, y=0.0, z=0.0),
-        rotation=Quaternion(x=x, y=y, z=z, w=w),
-    )
-    return FrameTransforms(transforms=[transform])
+    transforms = [
+        FrameTransform(
+            timestamp=stamp,
+            parent_frame_id=parent,
+            child_frame_id=frame,
+            translation=Vector3(**place),
+            rotation=Quaternion(**turn),
+        )
+        for frame, parent, place, turn in message.edges
+    ]
+    return FrameTransforms(transforms=transforms)

@@ -5,13 +5,14 @@ images: metres along the optical axis, NaN without a return).
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam.wire import PRODUCTS
+from transientcam.documents import ExtrinsicsDocument
+from transientcam.wire import Product
 
 CAMERA_FRAME: Final = "camera_link"
 """x where the camera looks, y left, z up, in m."""
@@ -43,13 +44,16 @@ class Pinhole:
     """Where they are known from; ``assumed`` is a guess of the service."""
     distortion: tuple[float, ...] = ()
     """k1, k2, p1, p2, k3 in the order of OpenCV (ROS calls it ``plumb_bob``), or empty."""
+    extrinsics: ExtrinsicsDocument | None = field(default=None, hash=False, kw_only=True)
+    """Where the camera is mounted; None where nobody says."""
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Self:
         """Return the intrinsics that a point cloud, or the camera's document, has."""
         names = ("fx", "fy", "cx", "cy", "width", "height", "source")
         distortion = tuple(document.get("distortion", ()))
-        return cls(**{name: document[name] for name in names}, distortion=distortion)
+        given = {name: document[name] for name in names}
+        return cls(**given, distortion=distortion, extrinsics=document.get("extrinsics"))
 
     @property
     def coefficients(self) -> list[float]:
@@ -151,21 +155,34 @@ class Calibration:
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """How `OPTICAL_FRAME` stands in `CAMERA_FRAME`; it never changes."""
+    """How `OPTICAL_FRAME` stands in `CAMERA_FRAME`, and that where it is mounted; constant."""
 
     topic: ClassVar[str] = "/tf_static"
     rotation_xyzw: ClassVar[tuple[float, float, float, float]] = (-0.5, 0.5, -0.5, 0.5)
+    mount: ExtrinsicsDocument | None = None
+
+    @property
+    def edges(self) -> list[tuple[str, str, dict[str, float], dict[str, float]]]:
+        """Each frame, that around it, and where it is there: x, y, z in m, and the quaternion."""
+        turn = dict(zip("xyzw", self.rotation_xyzw, strict=True))
+        found = [(OPTICAL_FRAME, CAMERA_FRAME, dict.fromkeys("xyz", 0.0), turn)]
+        if self.mount is not None:
+            x, y, z, w = (0.5 * each for each in self.mount["rotation_xyzw"])
+            # times the inverse of the rotation between both frames
+            turned = w + x + y + z, y + z - w - x, w + z - x - y, w + y - x - z
+            place = dict(zip("xyz", self.mount["translation_m"], strict=True))
+            turn = dict(zip("xyzw", turned, strict=True))
+            found.insert(0, (CAMERA_FRAME, self.mount["parent"], place, turn))
+        return found
 
 
 Message = Image | Points | Calibration | Transform
 
 
-def viewable(product: str) -> bool:
+def viewable(product: Product) -> bool:
     """Return whether a product can be sent: images, raw images and points."""
-    known = PRODUCTS.get(product)
-    return known is not None and (
-        product in ("raw", "pointcloud") or (known.axes == ("y", "x") and known.dtype in _ENCODINGS)
-    )
+    image = product.axes == ("y", "x") and product.dtype in _ENCODINGS
+    return image or product.name in ("raw", "pointcloud")
 
 
 def topics_of(product: str) -> dict[str, type[Message]]:
@@ -208,7 +225,7 @@ def messages_of(
     topics
         Those to yield; None for all.
     """
-    messages = (Transform(), Calibration(lens), *_of_products(arrays, intensity))
+    messages = (Transform(lens.extrinsics), Calibration(lens), *_of_products(arrays, intensity))
     for each in messages:
         if (
             isinstance(each, Image)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from transientcam.camera import Camera
 from transientcam.density import transient
-from transientcam.errors import ParameterError
 from transientcam.frame import Frame
 from transientcam.notebook import palette
 from transientcam.robotics._messages import (
@@ -25,11 +24,10 @@ from transientcam.robotics._messages import (
     Points,
     Transform,
     messages_of,
-    viewable,
 )
 from transientcam.robotics._reports import Level, Report
-from transientcam.robotics._source import Source, captured_s
-from transientcam.wire import PRODUCTS, Subscription
+from transientcam.robotics._source import Source, captured_s, require_viewable
+from transientcam.wire import Subscription
 
 FRAMES: Final = 16
 """How many frames are compared."""
@@ -194,11 +192,7 @@ class RerunBridge:
         bins: int = BINS,
         on_report: Callable[[Report], object] = lambda report: None,
     ) -> None:
-        known = [name for name in PRODUCTS if viewable(name) and name != "raw"]
-        for name in products:
-            if name not in (*known, "transient"):
-                limit = f"some of {', '.join((*known, 'transient'))}"
-                raise ParameterError("products", name, limit)
+        require_viewable(camera, products, "transient")
         self._recording = recording
         self._bins = bins
         self._on_report = on_report

@@ -2,16 +2,16 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, TypeVar
 
 from transientcam.camera import Camera
-from transientcam.errors import ProblemError, ServerUnreachable, StreamClosed
+from transientcam.errors import ParameterError, ProblemError, ServerUnreachable, StreamClosed
 from transientcam.frame import Frame
-from transientcam.robotics._messages import Pinhole
+from transientcam.robotics._messages import Pinhole, viewable
 from transientcam.robotics._reports import Report, report_of
 from transientcam.stream import Stream
-from transientcam.wire import Notice, Subscription
+from transientcam.wire import PRODUCTS, Notice, Product, Subscription
 
 RETRY_S: Final = 2.0
 DROPPED_EVERY_NS: Final = 5 * 10**9
@@ -24,6 +24,22 @@ def captured_s(frame: Frame) -> float:
     """Return when a frame was captured, in Unix time; of older daemons when it arrived."""
     captured_unix_s = frame.meta.get("captured_unix_s")
     return float(frame.meta["host_time_s"] if captured_unix_s is None else captured_unix_s)
+
+
+def require_viewable(camera: Camera, products: Iterable[str], *others: str) -> None:
+    """Refuse products that cannot be sent live, ours or another package's (ParameterError).
+
+    The camera is asked where there are any that are not ours.
+    """
+    known = dict(PRODUCTS)
+    if not known.keys() >= {*products} - {*others}:
+        for each in camera.info["products"]:
+            stated = each["unit"], tuple(each["axes"]), each["dtype"], each["summary"]
+            known[each["name"]] = Product(each["name"], *stated)
+    can_be_sent = [name for name, each in known.items() if viewable(each) and name != "raw"]
+    for name in products:
+        if name not in (*can_be_sent, *others):
+            raise ParameterError("products", name, f"some of {', '.join((*can_be_sent, *others))}")
 
 
 class Source:

@@ -12,7 +12,7 @@ from transientcam_driver.camera._capabilities import (
     Capabilities,
 )
 from transientcam_driver.camera._capture_clock import CaptureClock, capture_times
-from transientcam_driver.camera._factory import FactoryCalibration, Lamp, Lens
+from transientcam_driver.camera._factory import Extrinsics, FactoryCalibration, Lamp, Lens
 from transientcam_driver.camera._frame import Counters, Hop, RawFrame
 from transientcam_driver.camera._host_camera import HostCamera
 from transientcam_driver.camera._light import has_light, light_warning

@@ -130,6 +130,26 @@ class Lamp:
         return white
 
 
+@dataclass(frozen=True, slots=True)
+class Extrinsics:
+    """Where the sensor is in the frame ``parent``, as of a robot's link.
+
+    A point p of the camera (x right, y down, z where it looks, in m) is at R p + ``translation_m``
+    there, with R the unit quaternion ``rotation_xyzw``.
+    """
+
+    parent: str
+    rotation_xyzw: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
+    translation_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no pose (ValueError)."""
+        turn, place = self.rotation_xyzw, self.translation_m
+        unit = len(turn) == 4 and abs(math.hypot(*turn) - 1) < 1e-3
+        if not (self.parent and unit and len(place) == 3 and all(map(math.isfinite, place))):
+            raise ValueError(f"{self} has no name, no unit quaternion or no three finite lengths")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FactoryCalibration:
     """What a camera reports about itself.
@@ -143,8 +163,11 @@ class FactoryCalibration:
         None where the camera does not say.
     sensor
         Whose noise the images have; None where the camera does not say.
+    extrinsics
+        Where it is mounted; None where the camera does not say.
     """
 
     gains: NDArray[np.complex64] | None = None
     lens: Lens | None = None
     sensor: Sensor | None = None
+    extrinsics: Extrinsics | None = None

@@ -381,7 +381,8 @@ class Reconstruction:
     def noise_ratio(self) -> float | None:
         """Deviation of the images over that of the settings' sensor, at the median of b_0.
 
-        None without such a sensor, and where the images do not tell.
+        None without such a sensor, and where the images do not tell: nor do those that a driver
+        made of moments, which hold no more noise than that of rounding.
         """
         sensor, brightness = self.settings.sensor, np.asarray(self._least_brightness)
         if sensor is None or self._images is None:
@@ -391,7 +392,8 @@ class Reconstruction:
             return None
         signal = np.median(brightness[brightness > 0]) / 2
         stated = sensor.image_variance(np.maximum(signal + found.dark_dn - sensor.dark_dn, 0))
-        return float(np.sqrt(found.image_variance(signal) / stated))
+        shown = float(found.image_variance(signal))
+        return float(np.sqrt(shown / stated)) if shown > 2 / 12 else None
 
     @cached_property
     def noise(self) -> MomentNoise | None:

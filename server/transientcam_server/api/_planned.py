@@ -8,11 +8,13 @@ from typing import Any, Final, TypeVar
 
 from fastapi import Request, Response
 
+import transientcam_moments as tm
 from transientcam_server.api._documents.document import Document
 from transientcam_server.api._documents.job import JobDocument
 from transientcam_server.api._job_answers import accepted
 from transientcam_server.camera import Job
 from transientcam_server.errors import Problem, kinds
+from transientcam_server.imaging import unusable
 from transientcam_server.planning import Progress, families, takes_of
 from transientcam_server.service import Service
 
@@ -22,6 +24,7 @@ LOOKED: Final = 0.5
 """Share of the progress after which the scene was looked at."""
 REFUSALS: Final = (
     kinds.TARGET_UNREACHABLE,
+    kinds.ESTIMATOR_MISFIT,
     kinds.ONLY_MOMENTS,
     kinds.NO_FRAME_YET,
     kinds.SHUTTING_DOWN,
@@ -125,6 +128,8 @@ async def _ended(work: Coroutine[Any, Any, _Answer], ask: Callable[[], Awaitable
             await asyncio.wait({task}, timeout=_ASK_EVERY_S)
             await ask()
         return task.result()
+    except tm.PluginFailed as failed:
+        raise unusable(failed) from failed
     finally:
         task.cancel()
 

@@ -74,8 +74,8 @@ def plan(
     estimator: Annotated[
         str | None,
         typer.Option(
-            help="The only estimator to plan with: single-frequency, maximum-entropy, likelihood "
-            "or pisarenko.  [default: all of these]"
+            help="The only estimator to plan with: single-frequency, maximum-entropy, likelihood, "
+            "pisarenko, or one of another package.  [default: the first three]"
         ),
     ] = None,
     camera: Annotated[
@@ -132,7 +132,7 @@ def plan(
     budget |= {"computing_share": computing_share}
     stays = _fields(fixed or [])
     if front:
-        goal_of_one = {"--fix": fixed or None, "--estimator": estimator, "--map": map_file}
+        goal_of_one = {"--fix": fixed or None, "--map": map_file}
         _refuse(
             goal_of_one | _options(target) | _options(budget),
             "is for one sequence, and --front shows all that no other beats",
@@ -146,12 +146,12 @@ def plan(
         here |= {"return": returns or None}
         here |= {"brightness_dn_per_s": brightness_dn_per_s, "ambient_dn_per_s": ambient_dn_per_s}
         _refuse(_options(here), "is the daemon's")
-        wanted: dict[str, Any] = {"share": share}
+        wanted: dict[str, Any] = {"share": share, "estimator": estimator}
         wanted["region"] = None if of_pixels is None else of_pixels.to_document()
         if not front:
             target |= {"separation_share": separation_share} if separation_m else {}
             wanted |= {"target": _given(target), "budget": _given(budget), "fixed": stays}
-            wanted |= {"estimator": estimator, "map": map_file is not None}
+            wanted |= {"map": map_file is not None}
         make = partial(_by_daemon, daemon, token, wanted, map_file)
     else:
         from transientcam_server.cli.plan_here import View, by_camera
@@ -199,14 +199,14 @@ def _by_daemon(
 
 def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":
     from transientcam_driver import Sequence
-    from transientcam_server.planning import ESTIMATORS, Goal
+    from transientcam_server.errors import Problem
+    from transientcam_server.planning import Goal
 
-    estimator = asked["estimator"]
-    if estimator is not None and estimator not in ESTIMATORS:
-        known = ", ".join(ESTIMATORS)
-        why = f"{estimator!r} is none of {known}; `transientcam compare` measures others"
-        raise typer.BadParameter(why, param_hint="--estimator")
-    return Goal(**asked, base=Sequence.from_document(fixed), fixed=frozenset(fixed))
+    try:
+        return Goal(**asked, base=Sequence.from_document(fixed), fixed=frozenset(fixed))
+    except Problem as problem:
+        why = f"{problem.detail} `transientcam compare` measures others"
+        raise typer.BadParameter(why, param_hint="--estimator") from problem
 
 
 def _planned(

@@ -71,6 +71,7 @@ from transientcam_server.imaging._recipe.recipe import (
     listed,
     require_estimator,
     suited,
+    unusable,
 )
 from transientcam_server.imaging._recipe.waveform import (
     SWEEP_ON_A_SCENE,

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, Final, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam import wire
 from transientcam.robotics import Calibration, Message, Pinhole, messages_of, viewable
 from transientcam_server.errors import InputError, StorageError
 from transientcam_server.imaging import Column, in_words, known_intrinsics
-from transientcam_server.offline._computing import KNOWN
+from transientcam_server.offline._computing import KNOWN, known_products
 from transientcam_server.offline._formats import Content, library, whole
 from transientcam_server.offline._opening import OpenedRecording
 from transientcam_server.recording import Recording
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from transientcam.robotics import Encoded
 
 Schemas = Literal["foxglove", "ros2"]
-PRODUCTS: Final = tuple(name for name in KNOWN if viewable(name))
-"""What an .mcap can hold of each frame."""
+PRODUCTS: Final = tuple(name for name in KNOWN if viewable(wire.PRODUCTS[name]))
+"""Ours that an .mcap can hold of each frame; maps of other packages beside them."""
 _RAW: Final = "/raw/"
 
 
@@ -45,9 +46,10 @@ def write_mcap(
     The label of a raw image is the metadata of its topic; the recording's documents are a record
     of metadata, and all columns are in ``columns.npz``, an attachment: an .mcap has no arrays.
     """
-    unknown = [name for name in products if name not in PRODUCTS]
+    known = *PRODUCTS, *(name for name in known_products() if name not in KNOWN)
+    unknown = [name for name in products if name not in known]
     if unknown:
-        raise InputError("--product", "a product", ", ".join(unknown), " or ".join(PRODUCTS))
+        raise InputError("--product", "a product", ", ".join(unknown), " or ".join(known))
     foxglove = library("foxglove", "an .mcap")
     log = _Topics(foxglove, schemas, content.columns)
     lens = lens_of(recording)

@@ -10,7 +10,6 @@ from foxglove import Schema
 from rosbags.typesys import Stores, get_typestore
 
 from transientcam.robotics import (
-    CAMERA_FRAME,
     OPTICAL_FRAME,
     Calibration,
     Encoded,
@@ -139,19 +138,20 @@ def _calibration(message: Calibration, time_ns: int) -> Any:
 
 
 def _transform(message: Transform, time_ns: int) -> Any:
-    x, y, z, w = message.rotation_xyzw
-    transform = _made(
-        "geometry_msgs/msg/Transform",
-        translation=_made("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0),
-        rotation=_made("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-    )
-    stamped = _made(
-        "geometry_msgs/msg/TransformStamped",
-        header=_header(time_ns, CAMERA_FRAME),
-        child_frame_id=OPTICAL_FRAME,
-        transform=transform,
-    )
-    return _made("tf2_msgs/msg/TFMessage", transforms=[stamped])
+    stamped = [
+        _made(
+            "geometry_msgs/msg/TransformStamped",
+            header=_header(time_ns, parent),
+            child_frame_id=frame,
+            transform=_made(
+                "geometry_msgs/msg/Transform",
+                translation=_made("geometry_msgs/msg/Vector3", **place),
+                rotation=_made("geometry_msgs/msg/Quaternion", **turn),
+            ),
+        )
+        for frame, parent, place, turn in message.edges
+    ]
+    return _made("tf2_msgs/msg/TFMessage", transforms=stamped)
 
 
 _MAKERS: Final[dict[type[Message], Callable[[Any, int], Any]]] = {

@@ -11,17 +11,16 @@ from transientcam_server.imaging import Frame, Workers
 from transientcam_server.planning._looks import CACHED_S, Looks
 from transientcam_server.planning._planner import Planner, range_error
 from transientcam_server.planning._process.queue import PlanningQueue, Progress
-from transientcam_server.planning._scene.scene import Region
 from transientcam_server.planning._search.families import Goal
 
 _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
 _KEPT: Final = 8
 
 
-def front_goal(by: str, share: float | None = None, region: Region | None = None) -> Goal:
+def front_goal(by: str, share: float | None = None, **more: Any) -> Goal:
     """Return the goal that a front is compared by: all sequences reach it."""
     target: dict[str, Any] = {} if by == "range_error_m" else {by: _WIDE}
-    return Goal(share=share, region=region, **target)
+    return Goal(share=share, **more, **target)
 
 
 @dataclass(frozen=True, slots=True)

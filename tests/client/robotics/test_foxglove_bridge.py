@@ -38,7 +38,7 @@ def served() -> Iterator[Served]:
 def silent() -> Iterator[Camera]:
     """A camera that says its lens, and nothing else."""
     lens = {"fx": 3.0, "fy": 4.0, "cx": 1.0, "cy": 2.0, "width": 5, "height": 6, "source": "scene"}
-    answer = httpx.Response(200, json={"intrinsics": lens})
+    answer = httpx.Response(200, json={"intrinsics": lens, "products": []})
     with Camera("http://silent", transport=httpx.MockTransport(lambda request: answer)) as camera:
         yield camera
 

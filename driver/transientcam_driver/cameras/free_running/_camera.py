@@ -19,6 +19,8 @@ from transientcam_supervisor import OffSwitch
 RECEIVE_S: Final = 0.1
 """How long a device is waited for in one go, and so a stop."""
 _MOST_TAKES: Final = 16
+_HANGS_S: Final = 1.0
+"""A ``receive`` that has not returned by then is left behind: the light must go off."""
 
 
 class FreeRunningDevice(Protocol):
@@ -92,7 +94,8 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         about = self._device.description
         self._renderer = Renderer(about)
         self._capabilities = capabilities_of(about, self._renderer)
-        self.factory = FactoryCalibration(self._renderer.gains, about.lens, self._renderer.sensor)
+        made = self._renderer
+        self.factory = FactoryCalibration(made.gains, about.lens, made.sensor, about.extrinsics)
 
     @property
     def off_switch(self) -> OffSwitch:
@@ -108,7 +111,7 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         return self._device.temperature_c()
 
     def _silence(self) -> str:
-        return self._spoilt or "nothing"
+        return self._spoilt or f"{self._number} frames"
 
     def _set(self, applied: AppliedSequence) -> None:
         again = self._lit and applied.sequence.exposure_s != self._applied.sequence.exposure_s
@@ -141,7 +144,7 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         receiving, self._receiving = self._receiving, None
         if receiving is not None:
             receiving[1].set()
-            receiving[0].join()
+            receiving[0].join(_HANGS_S)
         with self._arrived:
             self._kept = None
             self._arrived.notify_all()
@@ -195,6 +198,8 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
             found: Capture | CameraLost | None
             try:
                 found = device.receive(RECEIVE_S)
+                if not isinstance(found, Capture | None):
+                    raise TypeError(f"{found!r:.60} is no Capture")
             except CameraLost as error:
                 found = error
             except Exception as error:  # of a plug-in: the camera is lost, and it says by what

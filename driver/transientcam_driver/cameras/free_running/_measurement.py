@@ -1,6 +1,7 @@
 """What a camera that runs by itself measures: raw exposures, complex moments, and its frames."""
 
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -8,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import Lens, Sensor
+from transientcam_driver.camera import Extrinsics, Lens, Sensor
 from transientcam_driver.errors import ProtocolError
 
 
@@ -65,6 +66,10 @@ class Capture:
     temperature_c: float | None = None
     capture_s: float | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse a number that is not whole (TypeError); one of NumPy would overflow."""
+        object.__setattr__(self, "number", operator.index(self.number))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Description:
@@ -77,6 +82,7 @@ class Description:
     `Exposure` leave; None where that is not known.
     ``max_range_m``: needed where frequencies have no base whose multiples are 32 or less.
     ``min_exposure_s``, ``max_exposure_s``: where the exposure can be set.
+    ``extrinsics``: where the sensor is mounted, where the device knows.
     ``clock``, ``heartbeat_s``: as of `Capabilities`.
     """
 
@@ -91,6 +97,7 @@ class Description:
     sensor: Sensor | None = None
     max_range_m: float | None = None
     lens: Lens | None = None
+    extrinsics: Extrinsics | None = None
     clock: Literal["device", "ptp"] = "device"
     heartbeat_s: float = 0.0
     min_exposure_s: float | None = None

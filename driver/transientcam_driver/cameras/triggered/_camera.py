@@ -75,7 +75,8 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
         self._capabilities = self._device.capabilities
         width, height = self._capabilities.width, self._capabilities.height
         lens = None if self.simulation is None else self.simulation.lens(width=width, height=height)
-        self.factory = None if lens is None else FactoryCalibration(lens=lens)
+        stated = getattr(self._device, "factory", None)
+        self.factory = stated if lens is None else FactoryCalibration(lens=lens)
 
     @property
     def off_switch(self) -> OffSwitch:
@@ -129,6 +130,10 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
             images = self._device.receive(timeout_s)
         except ImagesLost as error:
             return partial, error
+        except CameraError:
+            raise
+        except Exception as error:  # of a plug-in: the camera is lost, and it says by what
+            raise CameraLost(f"receive() raised {error!r}") from error
         return None if images is None else (partial, images)
 
     def _step(self, timeout_s: float) -> PartialFrame | None:
@@ -159,9 +164,13 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
         if isinstance(images, ImagesLost):
             self._drop(partial, images)
             return None
+        try:
+            partial.store(images)
+        except (TypeError, ValueError) as error:
+            self._drop(partial, ImagesLost(f"what receive() returned does not fit: {error}"))
+            return None
         self._losses = 0
         self.counters.images += len(images)
-        partial.store(images)
         return self._delivered(partial) if partial.complete else None
 
     def _drop(self, partial: PartialFrame, error: ImagesLost) -> None:

@@ -40,8 +40,8 @@ class PartialFrame:
 
     def store(self, images: Images) -> None:
         """Take the images of the next group."""
-        group = self._left.pop(0)
-        self.images[[label.index for label in group]] = images
+        self.images[[label.index for label in self._left[0]]] = images
+        self._left.pop(0)
         self.settled_s, self.exposing = None, False
 
 

@@ -2,6 +2,7 @@
 
 from typing import Any, Literal
 
+from transientcam.documents import ExtrinsicsDocument
 from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.camera import Cause, State
 
@@ -29,6 +30,8 @@ class CameraDocument(Document):
         beam: tuple[float, ...]
         """Its axis x, y, z, the power of the cosine to it that it falls with, and how bright in DN,
         for a second of exposure, a white surface is that faces it at 1 m; or none."""
+        extrinsics: ExtrinsicsDocument | None = None
+        """Null where nobody says where the camera is mounted."""
         source: Literal["settings", "camera", "scene", "recording", "origin", "assumed"]
         """Its origin: the settings `[lens]`, the camera itself, the simulated scene, the recording,
         the origin of a relay, or none."""

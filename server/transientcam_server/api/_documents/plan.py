@@ -93,10 +93,9 @@ class PlanRequest(_StrictDocument):
     """Whether a job is to predict the error of each pixel, too."""
     fixed: dict[str, Any] = Field(default_factory=dict)
     """Fields of the sequence that must stay as given here."""
-    estimator: Literal["single-frequency", "maximum-entropy", "likelihood", "pisarenko"] | None = (
-        None
-    )
-    """The only estimator to plan with; null considers all of these."""
+    estimator: str | None = Field(default=None, max_length=64)
+    """The only estimator to plan with: single-frequency, maximum-entropy, likelihood, pisarenko, or
+    one of another package; null considers the first three."""
     scene: SceneDocument | None = None
     """Null looks at the scene: by a simulated camera of its own in virtual time, or else by the
     current frame."""
@@ -305,6 +304,8 @@ class TradeoffRequest(_StrictDocument):
     """Of the pixels of a capture, whose error counts; null for that of the median pixel."""
     region: RegionOfPixels | None = None
     """Whose pixels count; null for the whole picture."""
+    estimator: str | None = Field(default=None, max_length=64)
+    """The only estimator to predict with, as of a plan."""
 
 
 class TradeoffDocument(Document):

@@ -40,6 +40,9 @@ async def read_tradeoff(
         str | None,
         Query(description="`x,y,width,height` or corners `x,y/x,y/x,y`", max_length=1000),
     ] = None,
+    estimator: Annotated[
+        str | None, Query(description="the only one to predict with", max_length=64)
+    ] = None,
 ) -> TradeoffDocument:
     """Return the Pareto front for the scene, its lines, and where the current frame stands.
 
@@ -47,7 +50,7 @@ async def read_tradeoff(
     frequencies is refused; `takes` of the problem says what more of them give. A client that leaves
     ends the work; `POST /tradeoff/jobs` reports its progress.
     """
-    goal = front_goal(by, share, Region.of(region))
+    goal = front_goal(by, share, region=Region.of(region), estimator=estimator)
     return await planned.for_request(http, await _work(service, goal, http))
 
 
@@ -67,7 +70,8 @@ async def start_tradeoff(
     lines. What that would be refused with is the `problem` of the job. It goes on when the client
     leaves; `POST /jobs/{job}/cancel` ends it.
     """
-    goal = front_goal(request.by, request.share, Region.of(request.region))
+    given = {"region": Region.of(request.region), "estimator": request.estimator}
+    goal = front_goal(request.by, request.share, **given)
     return planned.as_job(service, KIND, await _work(service, goal, http), response)
 
 

@@ -54,10 +54,11 @@ def ply(frame: Frame) -> bytes:
         vertices[name] = plane[there]
     for name, beside in (("range", "range"), ("amplitude", "direct"), ("flags", "flags")):
         vertices[name] = frame.extra[beside][there]
+    mounted = {"extrinsics": found} if (found := frame.meta.get("extrinsics")) else {}
     lines = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment {json.dumps({'unit': 'm', 'frame': frame.frame})}",
+        f"comment {json.dumps({'unit': 'm', 'frame': frame.frame} | mounted)}",
         f"element vertex {len(vertices)}",
         *(f"property {_PLY_TYPES[_VERTEX[name].str]} {name}" for name in _VERTEX.names or ()),
         "end_header\n",

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_moments.comparisons import PLUGINS, separated
+from transientcam_moments.plugins import CALLERS
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -29,11 +31,15 @@ def ranges_m(
         phase = np.remainder(np.angle(b[1]), 2 * np.pi)
     elif estimator == "pisarenko":
         phase = tm.separate(tm.pisarenko(b), settings.return_threshold).phase_rad
-    elif estimator == "likelihood":
+    elif estimator == "likelihood" or estimator in PLUGINS.names():
         if zeroth == "estimated":  # b_0 is not measured, and has no noise of its own
             variance = np.concatenate([np.zeros_like(variance[:1]), variance[1:]])
-        noise = tm.noise.MomentNoise(variance)
-        phase = tm.likelihood(b, noise).separate(settings.return_threshold).phase_rad
+        at = settings.return_threshold
+        if estimator == "likelihood":
+            phase = tm.likelihood(b, tm.noise.MomentNoise(variance)).separate(at).phase_rad
+        else:
+            told = variance, base_frequency_hz * np.arange(len(b)), at
+            phase = CALLERS[-1](PLUGINS.group, separated, estimator, b, *told).phase_rad
     else:
         plain = settings.model_copy(
             update={"neighbours": "none", "minimum_brightness_dn": 0.0, "estimator": estimator}

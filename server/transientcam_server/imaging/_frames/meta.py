@@ -43,6 +43,7 @@ def frame_meta(
         "takes": sequence.takes,
         "width": width,
         "height": height,
+        "extrinsics": None if recipe.intrinsics is None else recipe.intrinsics.extrinsics,
         "temperature_c": raw.temperature_c,
         "lost_images": raw.lost_images,
         "hops": [

@@ -3,16 +3,17 @@
 import contextlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam.documents import ExtrinsicsDocument
 from transientcam.robotics import Pinhole
-from transientcam_driver import Lens
-from transientcam_server.settings import LensSettings, has_switch
+from transientcam_driver import Extrinsics, Lens
+from transientcam_server.settings import LensSettings, dataclass_of, has_switch
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
 """Of a camera whose lens is not known."""
@@ -63,7 +64,8 @@ class Intrinsics(Pinhole):
             field_deg = settings.field_of_view_deg or ASSUMED_FIELD_OF_VIEW_DEG
             known = self.of_field(field_deg, width=self.width, height=self.height)
             known = replace(known, source="settings", distortion=settings.distortion)
-        kept = {name: getattr(self, name) for name in _LIGHT} | {"beam": settings.beam or self.beam}
+        kept = {name: getattr(self, name) for name in (*_LIGHT, "extrinsics")}
+        kept |= {"beam": settings.beam or self.beam}
         given = {name: getattr(settings, f"{name}_px") for name in ("fx", "cx", "cy")}
         given |= {"fy": settings.fy_px or settings.fx_px}
         given |= {name: getattr(settings, name) for name in _LIGHT}
@@ -86,7 +88,10 @@ class Intrinsics(Pinhole):
         beam = tuple(float(each) for each in document.get("beam", ()))
         lens = Lens(fx, fy, cx, cy, distortion, x_m, y_m, z_m, beam)
         width, height = int(document["width"]), int(document["height"])
-        return cls.of_lens(lens, width=width, height=height, source=source)
+        known = cls.of_lens(lens, width=width, height=height, source=source)
+        if (stated := document.get("extrinsics")) is not None:
+            dataclass_of(Extrinsics, stated)
+        return replace(known, extrinsics=stated)
 
     @classmethod
     def of_lens(cls, lens: Lens, *, width: int, height: int, source: Source) -> Self:
@@ -132,6 +137,7 @@ def known_intrinsics(
     width: int,
     height: int,
     reported: Lens | None = None,
+    mounted: Extrinsics | None = None,
     scene: Lens | None = None,
     recorded: Mapping[str, Any] | None = None,
     relayed: Mapping[str, Any] | None = None,
@@ -153,4 +159,6 @@ def known_intrinsics(
         source: Source = "origin" if recorded is None else "recording"
         with contextlib.suppress(KeyError, TypeError, ValueError):
             found = Intrinsics.of_document(recorded or relayed or {}, source=source)
+    if mounted is not None:
+        found = replace(found, extrinsics=cast("ExtrinsicsDocument", asdict(mounted)))
     return found.with_settings(settings)

@@ -64,9 +64,7 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
         )
     failed = PLUGINS.loaded(settings.estimator) if settings.estimator in PLUGINS.names() else None
     if isinstance(failed, tm.PluginFailed):
-        limit = "one that can be used"
-        at, value = "estimator", settings.estimator
-        raise Problem(kinds.ESTIMATOR_MISFIT, f"{failed}.", field=at, value=value, limit=limit)
+        raise unusable(failed)
     least, harmonics = settings.least_harmonics, sequence.harmonics
     if harmonics >= least:
         return
@@ -79,6 +77,12 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
         if field == "harmonics"
         else f"one that does with {harmonics} harmonics",
     )
+
+
+def unusable(failed: tm.PluginFailed) -> Problem:
+    """Return the Problem ``estimator-misfit`` of an estimator of another package."""
+    told = {"value": failed.name, "limit": "one that can be used"}
+    return Problem(kinds.ESTIMATOR_MISFIT, f"{failed}.", field="estimator", **told)
 
 
 def suited(settings: ReconstructionSettings, sampling: Sampling) -> ReconstructionSettings:

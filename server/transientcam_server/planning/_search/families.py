@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 from transientcam_driver import AppliedSequence, Capabilities, Sequence, SequenceError
-from transientcam_moments.comparisons import TECHNIQUES
+from transientcam_moments.comparisons import PLUGINS, technique_of
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import listed
 from transientcam_server.planning._prediction.prediction import OUTVOTED, Predictor
-from transientcam_server.planning._scene.estimation import MOST_HARMONICS, SEARCHED
+from transientcam_server.planning._scene.estimation import ESTIMATORS, MOST_HARMONICS, SEARCHED
 from transientcam_server.planning._scene.scene import Region
 
 TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
@@ -41,7 +41,8 @@ class Goal:
     machine.
     ``base``: Sequence whose base frequency, half of it or a multiple, is used, and its sub-phases.
     ``fixed``: Names of further fields of it that must stay.
-    ``estimator``: The only one that is planned with; None for any.
+    ``estimator``: The only one that is planned with, ours or another package's; None for any of
+    ours. Raises Problem ``invalid-request`` where there is none of that name.
     """
 
     range_error_m: float | None = None
@@ -57,6 +58,14 @@ class Goal:
     base: Sequence = field(default_factory=Sequence)
     fixed: frozenset[str] = frozenset()
     estimator: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse an estimator that nothing is predicted with."""
+        known = None, *ESTIMATORS, *PLUGINS.names()
+        if self.estimator not in known:
+            limit = f"one of {', '.join(map(str, known[1:]))}"
+            told = {"field": "estimator", "value": self.estimator, "limit": limit}
+            raise Problem(kinds.INVALID_REQUEST, f"estimator must be {limit}.", **told)
 
     @property
     def empty(self) -> bool:
@@ -321,7 +330,7 @@ def _frequencies(goal: Goal) -> Iterator[tuple[Sequence, str]]:
         most = MOST_HARMONICS.get(estimator, m)
         # with one harmonic all estimators take its phase
         plain = m == 1 and estimator != "single-frequency" and goal.estimator is None
-        least = TECHNIQUES[estimator].least_harmonics
+        least = technique_of(estimator).least_harmonics
         if m < least or plain or (m > most and "harmonics" not in fixed):
             continue
         yield replace(base, harmonics=m, base_frequency_hz=frequency_hz, zeroth=zeroth), estimator

@@ -11,6 +11,7 @@ from transientcam_driver import (
     CameraPlugin,
     Capture,
     Description,
+    Extrinsics,
     FreeRunningCamera,
     Lens,
     Moment,
@@ -37,6 +38,7 @@ class Device:
             frame_rate_hz=RATE_HZ,
             measurements=MEASURED,
             lens=Lens(60.0, 60.0, 31.5, 23.5),
+            extrinsics=Extrinsics("base_link", (0.5, -0.5, 0.5, 0.5), (0.2, -0.1, 1.3)),
         )
 
     def start(self, exposure_s: float) -> None:

@@ -136,6 +136,51 @@ def test_a_device_whose_frames_never_fit_is_lost_with_the_reason() -> None:
     camera.close()
 
 
+def test_a_receive_that_hangs_is_left_behind_and_said() -> None:
+    hangs = threading.Event()
+
+    class Hanging(Device):
+        def receive(self, timeout_s: float) -> Capture | None:
+            hangs.wait()
+            return None
+
+    device = Hanging(ABOUT, [good(0)])
+    camera = FreeRunningCamera(lambda: device, silence_s=0.3)
+    camera.start()
+
+    with pytest.raises(CameraLost, match=r"0 frames since it was opened"):
+        camera.read_frame(timeout_s=60.0)
+
+    assert device._stopped.is_set()  # the light
+    camera.close()
+    hangs.set()
+
+
+def test_what_is_no_capture_is_named() -> None:
+    class Odd(Device):
+        def receive(self, timeout_s: float) -> Any:
+            return ["an image"]
+
+    camera = FreeRunningCamera(lambda: Odd(ABOUT, []), silence_s=60.0)
+    camera.start()
+
+    with pytest.raises(CameraLost, match=r"\['an image'\] is no Capture"):
+        camera.read_frame(timeout_s=60.0)
+
+    camera.close()
+
+
+def test_counters_of_numpy_neither_overflow_nor_lose(read: _Read) -> None:
+    numbers: list[Any] = [np.uint8(254), np.uint8(255), np.uint16(256)]
+    camera = read([good(each, 0.001 * k) for k, each in enumerate(numbers)])
+
+    frames = [camera.read_frame(timeout_s=60.0) for _ in numbers]
+
+    assert sum(each.lost_images for each in frames) == 0
+    with pytest.raises(TypeError, match="integer"):
+        good(None, 0.0)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_pixels_of_exposures_that_are_no_number_count_as_saturated(
     read: _Read, value: float

@@ -1,13 +1,17 @@
 """Cameras that expose on request: order, settling, losses, and no unrequested light."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from tests.driver.cameras.triggered.scripted import EXPOSED_S, SETTLES_S, Cable
+from tests.driver.cameras.triggered.scripted import EXPOSED_S, SETTLES_S, Cable, ScriptedDevice
 from transientcam_driver import (
     CameraLost,
     CameraNotFound,
+    Extrinsics,
+    FactoryCalibration,
     FrameTimeout,
     NotStreaming,
     Sequence,
@@ -153,3 +157,30 @@ def test_a_camera_whose_images_never_come_is_lost_with_the_reason() -> None:
         assert camera.state == CameraState.DISCONNECTED
         camera.reconnect()
         assert camera.read_frame().lost_images == 20
+
+
+ODD: dict[str, object] = {}
+
+
+@pytest.mark.parametrize(
+    ("returned", "reason"),
+    [
+        (lambda: np.zeros((4, 2, 2), np.uint16), "5 times in a row .* does not fit: shape"),
+        (lambda: ODD["lut"], r"receive\(\) raised KeyError\('lut'\)"),
+    ],
+)
+def test_a_device_that_returns_or_raises_something_else_is_lost_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch, returned: Callable[[], object], reason: str
+) -> None:
+    monkeypatch.setattr(ScriptedDevice, "receive", lambda self, timeout_s: returned())
+    with Cable().camera() as camera:
+        camera.start()
+        with pytest.raises(CameraLost, match=reason):
+            camera.read_frame()
+
+
+def test_what_a_device_states_of_itself_is_the_cameras(monkeypatch: pytest.MonkeyPatch) -> None:
+    stated = FactoryCalibration(extrinsics=Extrinsics("base_link"))
+    monkeypatch.setattr(ScriptedDevice, "factory", stated, raising=False)
+    with Cable().camera() as camera:
+        assert camera.factory is stated

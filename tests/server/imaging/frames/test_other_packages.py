@@ -1,24 +1,32 @@
 """Estimators and products of other packages: offered everywhere, and no harm to others."""
 
+import json
 import sys
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import copy
+from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+import rerun as rr
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 import transientcam
 import transientcam_moments as tm
+from tests.client.robotics.viewer import viewing
 from tests.conftest import ROOT
 from tests.server.camera.plug_in import install as install_wall, install_package
 from tests.server.recording.made import record
 from tests.serving import serving
 from transientcam import Camera
 from transientcam.cli import run as command
-from transientcam.errors import ProblemError
+from transientcam.errors import ParameterError, ProblemError
+from transientcam.robotics import FoxgloveBridge, RerunBridge
 from transientcam_moments import comparisons, plugins
 from transientcam_server.api import _parameters as parameters
 from transientcam_server.daemon import _doctor as doctor
@@ -185,6 +193,24 @@ def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
     assert "package_that_is_not_there" in refused.json()["detail"]
 
 
+def live_in_viewers(camera: Camera, product: str, file: Path) -> tuple[Any, bytes]:
+    """Show a product in Foxglove, and as a file of Rerun."""
+    with FoxgloveBridge(camera, products=[product], port=0) as bridge:
+        thread = threading.Thread(target=bridge.run)
+        thread.start()
+        with viewing(bridge.url) as viewer:
+            viewer.subscribe(f"/{product}")
+            seen = viewer.message(f"/{product}").decoded
+        bridge.close()
+        thread.join()
+    recording = rr.RecordingStream("transientcam")
+    recording.set_sinks(rr.FileSink(file))
+    with RerunBridge(camera, recording, products=[product]) as rerun:
+        rerun.run(1)
+    recording.disconnect()
+    return seen, file.read_bytes()
+
+
 def test_a_daemon_has_their_products_beside_its_own(tmp_path: Path) -> None:
     (wall := tmp_path / "wall.txt").write_text("2.5")
     with (
@@ -200,6 +226,9 @@ def test_a_daemon_has_their_products_beside_its_own(tmp_path: Path) -> None:
         apart, moments = camera.frame("range-disagreement"), camera.frame("moments")
         picture = httpx.get(f"{served.url}/api/v1/frames/latest/range-disagreement.png")
         asyncapi = httpx.get(f"{served.url}/asyncapi.json").text
+        viewed, logged = live_in_viewers(camera, "range-disagreement", tmp_path / "a.rrd")
+        with pytest.raises(ParameterError, match="direct_share, range-disagreement"):
+            FoxgloveBridge(camera, products=["nothing"], port=0)
 
     products = {each["name"]: each for each in info["products"]}
     absent = {each["name"]: each["reason"] for each in info["absent_products"]}
@@ -212,6 +241,9 @@ def test_a_daemon_has_their_products_beside_its_own(tmp_path: Path) -> None:
     assert 0 <= np.nanmax(apart.array) < 5e-3  # of one return; a step of an image is 1 mm
     assert picture.headers["Transientcam-Unit"] == "mm"
     assert "range-disagreement" in asyncapi
+    in_viewer = np.frombuffer(viewed.data, "<f4").reshape(apart.array.shape)
+    assert in_viewer == pytest.approx(apart.array, abs=5e-3)
+    assert b"images/range-disagreement" in logged
 
 
 def test_a_recording_has_their_products(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -233,8 +265,55 @@ def test_a_recording_has_their_products(tmp_path: Path, capsys: pytest.CaptureFi
         for each, turn_m in zip(range_m, turns_m, strict=True)
     ]
     assert from_file == pytest.approx(np.max(apart_m, axis=0), abs=1e-4)
+    mcap = tmp_path / "a.mcap"
+    product = ["--product", "range-disagreement"]
+    assert command(["convert", str(recorded), "-o", str(mcap), *product]) == 0
+    with mcap.open("rb") as file:
+        messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        (image,) = (each for _, channel, _, each in messages if channel.topic == f"/{product[1]}")
+    assert np.array_equal(np.frombuffer(image.data, "<f4"), from_file.ravel(), equal_nan=True)
     assert command([*asked[:-1], "missing"]) != 0
     assert "package_that_is_not_there" in capsys.readouterr().err
+
+
+def test_plans_predict_with_it_what_captures_show() -> None:
+    """The oracle draws images of a sensor's data sheet, and makes moments of them by hand."""
+    fixed: dict[str, Any] = {"harmonics": 3, "base_frequency_hz": 20e6, "zeroth": "estimated"}
+    fixed |= {"exposure_s": 5e-4, "takes": 1, "sub_phases": {"scheme": "none"}}
+    sheet = {"gain_e_per_dn": 9.0, "read_noise_e": 30.0}
+    given = {"brightness_dn_per_s": 2e6, "returns": [{"range_m": 2.0}]}
+    wanted: dict[str, Any] = {"budget": {"capture_s": 1.0}, "fixed": fixed, "scene": given}
+    with serving("sim:wall", sensor=sheet) as served, Camera(served.url, timeout_s=600.0) as camera:
+        camera.reconstruction = {"neighbours": "none"}
+        plan = camera.plan(**wanted, estimator="matched-filter")
+        problems = []
+        for name in ("raises", "absent", "nonsense"):
+            with pytest.raises(ProblemError) as refused:
+                camera.plan(**wanted, estimator=name)
+            problems.append((refused.value.status, refused.value.document["field"]))
+    random, j = np.random.default_rng(5), np.arange(1, 4)[:, None, None]
+    phase_rad = np.pi / 2 * np.arange(4)[:, None]
+    seen = np.exp(4j * np.pi * 20e6 * j * 2.0 / 299_792_458.0 - 1j * phase_rad)
+    light_dn = np.broadcast_to(1000.0 * (1 + np.real(seen)) / 2, (3, 4, 4000))
+    noise_dn = np.sqrt(light_dn / 9.0 + (30.0 / 9.0) ** 2 + 1 / 12)
+    images = light_dn + noise_dn * random.standard_normal(light_dn.shape)
+    b = np.concatenate([np.full((1, 4000), 1000.0), (images * np.exp(1j * phase_rad)).sum(axis=1)])
+    range_m = tm.range_m(comparisons.technique_of("matched-filter").of(b).first_phase_rad(), 20e6)
+    assert plan["estimator"] == "matched-filter"
+    predicted = plan["predicted"]["range_std_m"]["median"]
+    assert predicted == pytest.approx(np.std(range_m), rel=0.1)
+    assert problems == [(409, "estimator"), (409, "estimator"), (422, "estimator")]
+
+
+def test_a_front_is_of_the_estimator_that_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = ["--brightness-dn-per-s", "1e6", "--front", "--json"]
+
+    assert command(["plan", *scene, "--estimator", "matched-filter"]) == 0, capsys.readouterr().err
+
+    found = json.loads(capsys.readouterr().out)
+    assert {each["estimator"] for each in found["front"] + found["lines"]} == {"matched-filter"}
+    assert command(["plan", *scene, "--estimator", "nonsense"]) == 2
+    assert "matched-filter" in capsys.readouterr().err
 
 
 def test_the_doctor_says_which_can_be_used() -> None:
