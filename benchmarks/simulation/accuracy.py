@@ -1,19 +1,17 @@
-"""What the automatic choice leaves out: against everything, and against many rays a pixel.
+"""What the automatic choice leaves out: against everything, and against nothing.
 
-Moments are compared before noise, in units of the noise of one moment of the pixel concerned. The
-reference follows rays at every image's own time, with all effects that the scene has anything for;
-where something moves, in some of the pixels, drawn once.
+Moments are compared before noise, in units of the noise of one moment of the pixel concerned, with
+all effects that the scene has anything for and with none; `judge` holds the same automatic choice
+against light that is followed independently.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common.tables import Table, heads
-from benchmarks.simulation.reference import FINE_MOVING, FINE_STILL, reference_moments
 from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
@@ -24,8 +22,6 @@ from transientcam_simulation.scene import Scene
 READOUT_S = 3.98e-3
 START_S = 9.0  # a visitor is there
 SIZE = 163, 120
-DRAWN = 1500  # pixels of moving scenes that are held against the reference
-_FINER_IN = 4  # so many times as many rays, in one in so many of these pixels
 SEQUENCES = {
     "video": Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005),
     "m = 4 x 20": Sequence(harmonics=4, takes=20),
@@ -55,8 +51,6 @@ class Accuracy:
     called: tuple[str, ...]
     everything: Difference
     nothing: Difference
-    rays: Difference | None
-    finer_rays: Difference | None
 
 
 def measure(name: str, sequence_name: str) -> Accuracy:
@@ -74,14 +68,6 @@ def measure(name: str, sequence_name: str) -> Accuracy:
         for choice in ("on", "off")
     )
     found = _moments(automatic, sequence)
-    pixel = np.arange(SIZE[0] * SIZE[1])
-    if scene.moves:
-        pixel = np.sort(np.random.default_rng(1).choice(pixel, DRAWN, replace=False))
-    fine = FINE_MOVING if scene.moves else FINE_STILL
-    reference = _reference(scene, automatic, sequence, pixel, fine=fine)
-    finer = None
-    if scene.moves:
-        finer = _reference(scene, automatic, sequence, pixel[::_FINER_IN], fine=_FINER_IN * fine)
     brightness = automatic.truth(device_time_s=START_S).brightness.ravel()
     gain_e = sequence.exposure_s * scene.light.electrons_per_s / automatic.sensor.gain_e_per_dn
     conditions = automatic.conditions(sequence)
@@ -95,16 +81,6 @@ def measure(name: str, sequence_name: str) -> Accuracy:
         tuple(each.effect for each in explained.effects if each.built and each.choice == "auto"),
         _difference(found - _moments(everything, sequence), deviation_e, lit),
         _difference(found - _moments(nothing, sequence), deviation_e, lit),
-        None
-        if reference is None
-        else _difference(found[:, pixel] - reference, deviation_e[pixel], lit[pixel]),
-        None
-        if reference is None or finer is None
-        else _difference(
-            reference[:, ::_FINER_IN] - finer,
-            deviation_e[pixel[::_FINER_IN]],
-            lit[pixel[::_FINER_IN]],
-        ),
     )
 
 
@@ -152,48 +128,16 @@ def _difference(
     )
 
 
-def _reference(
-    scene: Scene, world: World, sequence: Sequence, pixel: NDArray[np.intp], *, fine: int
-) -> Moments | None:
-    """Moments of some pixels by many rays in each image; None for scenes without geometry."""
-    if scene.camera is None or scene.device.name != "ideal":
-        return None
-    conditions = world.conditions(sequence)
-    cosine = conditions.cosine.ravel()[pixel] ** scene.camera.lens.vignetting
-    scale_e = 0.5 * scene.light.electrons_per_s * sequence.exposure_s
-    period_s = sequence.exposure_s + READOUT_S
-    frequencies_hz = tuple(sorted({0.0, *(label.frequency_hz for label in sequence.labels)}))
-
-    @cache
-    def moments_at(time_s: float, frequencies_hz: tuple[float, ...]) -> Moments:
-        return reference_moments(scene.at(time_s), pixel, SIZE, frequencies_hz, fine=fine)
-
-    def image(label: ImageLabel) -> NDArray[np.float64]:
-        time_s, asked_hz = 0.0, frequencies_hz
-        if scene.moves:
-            time_s, asked_hz = START_S + label.index * period_s, (0.0, label.frequency_hz)
-        moments = moments_at(time_s, asked_hz)
-        modulated = moments[asked_hz.index(label.frequency_hz)]
-        turned = modulated * conditions.sub_phase_gain(1) * np.exp(-1j * label.phase_rad)
-        electrons: NDArray[np.float64] = scale_e * cosine * (moments[0] + turned).real
-        return electrons  # but for other light, which cancels
-
-    return four_buckets(sequence, image)
-
-
 def tables(*, small: bool = False) -> Iterator[Table]:
     """Compare all scenes with each sequence; ``small``: only with that of video."""
-    columns = heads(
-        "scene | sequence | called for | automatic - everything | automatic - nothing | "
-        "automatic - rays | rays - more rays"
-    )
+    columns = heads("scene | sequence | called for | automatic - everything | automatic - nothing")
     table = Table("", columns)
     for name in (*BUILT_IN, *unseen()):
         for sequence in list(SEQUENCES)[: 1 if small else None]:
             each = measure(name, sequence)
-            others = (each.everything, each.nothing, each.rays, each.finer_rays)
             called = ", ".join(_of_scene(each.called))
-            table.rows.append((each.scene, each.sequence, called, *map(_words, others)))
+            others = _words(each.everything), _words(each.nothing)
+            table.rows.append((each.scene, each.sequence, called, *others))
     yield table
 
 
@@ -202,7 +146,5 @@ def _of_scene(called: tuple[str, ...]) -> list[str]:
     return [each for each in called if each not in always] or ["-"]
 
 
-def _words(each: Difference | None) -> str:
-    if each is None:
-        return "-"
+def _words(each: Difference) -> str:
     return f"{each.rms:.2f}, {each.largest:.1f}, {each.beyond_half:.2%}"

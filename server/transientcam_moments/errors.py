@@ -9,6 +9,7 @@ MomentsError
 """
 
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 
 class MomentsError(Exception):
@@ -22,9 +23,16 @@ class MomentsError(Exception):
             print(error)
     """
 
+    _sentence: ClassVar[str] = ""
+    """What ``str`` gives: a format string of the fields."""
+
     def __post_init__(self) -> None:
         """Give the fields to the exception itself, which is pickled with them."""
         self.args = tuple(getattr(self, each.name) for each in fields(self))  # type: ignore[arg-type]  # of dataclasses
+
+    def __str__(self) -> str:
+        """Say what is wrong."""
+        return self._sentence.format_map(vars(self)) if self._sentence else super().__str__()
 
 
 @dataclass(eq=False)
@@ -37,10 +45,7 @@ class ShapeError(MomentsError, ValueError):
     name: str
     found: object
     expected: str
-
-    def __str__(self) -> str:
-        """Name the array, what it is and what it has to be."""
-        return f"{self.name} is {self.found}, expected {self.expected}"
+    _sentence = "{name} is {found}, expected {expected}"
 
 
 @dataclass(eq=False)
@@ -50,10 +55,7 @@ class ParameterError(MomentsError, ValueError):
     field: str
     value: object
     limit: str
-
-    def __str__(self) -> str:
-        """Name the argument, its value and the limit."""
-        return f"{self.field} = {self.value!r} is outside of its limit: {self.limit}"
+    _sentence = "{field} = {value!r} is outside of its limit: {limit}"
 
 
 @dataclass(eq=False)
@@ -63,10 +65,7 @@ class PluginFailed(MomentsError, RuntimeError):  # noqa: N818 - says what has ha
     kind: str
     name: str
     reason: str
-
-    def __str__(self) -> str:
-        """Name it and what is wrong with it."""
-        return f"the {self.kind} {self.name} of another package failed: {self.reason}"
+    _sentence = "the {kind} {name} of another package failed: {reason}"
 
 
 @dataclass(eq=False)
@@ -75,10 +74,7 @@ class DeviceUnavailable(MomentsError, RuntimeError):  # noqa: N818 - says what h
 
     device: str
     reason: str
-
-    def __str__(self) -> str:
-        """Name the device and what is wrong with it."""
-        return f"device = {self.device!r} cannot be used: {self.reason}"
+    _sentence = "device = {device!r} cannot be used: {reason}"
 
 
 @dataclass(eq=False)

@@ -84,6 +84,14 @@ _KEPT_S = 0.1
 _NOISE_FRAMES: Final = 16
 """So many frames after another the noise of the images is held against the stated sensor's."""
 _SAME_NOISE: Final = 1.2
+_NOTICES: Final[Mapping[type[Event], str]] = {
+    CameraLostEvent: "camera-lost",
+    CameraRecoveredEvent: "camera-back",
+    LightArmingEvent: "light-arming",
+    LightUnconfirmedEvent: "light-unconfirmed",
+    LightConfirmedEvent: "light-confirmed",
+}
+"""Events of which clients are told no more than their fields."""
 WORKER_THREADS: Final = "worker"
 """What the names of their threads begin with."""
 
@@ -486,18 +494,8 @@ class Service:
                 self.history.append(frame)
                 self.hub.publish(frame)
                 self.calibrations.observe(raw.temperature_c, applied)
-            case CameraLostEvent(reason):
-                self.hub.notify("camera-lost", {"reason": reason})
-            case CameraRecoveredEvent():
-                self.hub.notify("camera-back", {})
-            case LightArmingEvent(in_s):
-                self.hub.notify("light-arming", {"in_s": in_s})
             case LightOffEvent(dark):
                 self.hub.notify("light-off", {"because": dark.cause, "reason": str(dark)})
-            case LightUnconfirmedEvent(reason):
-                self.hub.notify("light-unconfirmed", {"reason": reason})
-            case LightConfirmedEvent():
-                self.hub.notify("light-confirmed", {})
             case OriginChanged():
                 self._adopt_calibration()
                 self._reconstruct_with(self._of_origin(self.pipeline.reconstruction.settings))
@@ -505,6 +503,8 @@ class Service:
                 before, self.applied = self.applied, applied
                 self._notify_sequence_changed()
                 self._notify_calibration(before)
+            case _:
+                self.hub.notify(_NOTICES[type(event)], asdict(event))
 
     def _adopt_calibration(self) -> None:
         """Calibrate as the origin does from the next frame on, unless a file was given here."""

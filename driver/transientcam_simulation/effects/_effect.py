@@ -103,6 +103,7 @@ class Effect(ABC):
 
     def __init__(self, conditions: Conditions) -> None:
         self._sensor = conditions.sensor
+        self._figures: Any = getattr(conditions.device, self.figures) if self.figures else None
 
     @classmethod
     @abstractmethod

@@ -27,11 +27,6 @@ class ModulationHarmonics(Effect):
     what = "the modulation is no pure sinusoid"
     figures = "waveform"
 
-    def __init__(self, conditions: Conditions) -> None:
-        super().__init__(conditions)
-        assert conditions.device.waveform is not None  # noqa: S101  (else it is not built)
-        self._waveform = conditions.device.waveform
-
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Where the device has harmonics that sub-phases leave in the moments."""
@@ -53,7 +48,7 @@ class ModulationHarmonics(Effect):
 
     def harmonics(self, frequency_hz: float) -> dict[int, complex]:
         """Content of the harmonics of a frequency, relative to the fundamental."""
-        return harmonics(self._waveform, frequency_hz)
+        return harmonics(self._figures, frequency_hz)
 
 
 def harmonics(waveform: Waveform, frequency_hz: float) -> dict[int, complex]:

@@ -16,11 +16,6 @@ class AmplitudeRollOff(PlaneEffect):
     what = "high frequencies are modulated less"
     figures = "roll_off"
 
-    def __init__(self, conditions: Conditions) -> None:
-        super().__init__(conditions)
-        assert conditions.device.roll_off is not None  # noqa: S101  (else it is not built)
-        self._roll_off = conditions.device.roll_off
-
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Where the device's amplitude falls off between the frequencies that are measured."""
@@ -34,7 +29,7 @@ class AmplitudeRollOff(PlaneEffect):
     def on_light(self, planes: LightPlanes) -> None:
         """Weaken the modulated part."""
         if planes.frequency_hz:
-            factor = np.float32(amplitude(self._roll_off, planes.frequency_hz))
+            factor = np.float32(amplitude(self._figures, planes.frequency_hz))
             for term in planes.terms.values():
                 term *= factor
 
@@ -51,11 +46,6 @@ class ThermalDrift(ShotEffect):
     what = "the light comes later as the camera warms up"
     figures = "drift"
 
-    def __init__(self, conditions: Conditions) -> None:
-        super().__init__(conditions)
-        assert conditions.device.drift is not None  # noqa: S101  (else it is not built)
-        self._drift = conditions.device.drift
-
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Where the whole rise of the device's temperature shows."""
@@ -69,11 +59,11 @@ class ThermalDrift(ShotEffect):
 
     def rise_c(self, device_time_s: float) -> float:
         """How much warmer the device is than at its start."""
-        return rise_c(self._drift, device_time_s)
+        return rise_c(self._figures, device_time_s)
 
     def on_shot(self, shot: Shot) -> None:
         """Delay the light."""
-        shot.delay_s += self._drift.delay_s_per_c * self.rise_c(shot.device_time_s)
+        shot.delay_s += self._figures.delay_s_per_c * self.rise_c(shot.device_time_s)
 
 
 def rise_c(drift: Drift, device_time_s: float) -> float:
@@ -92,11 +82,6 @@ class SynchronisationOutliers(ShotEffect):
     what = "images that lose their synchronisation"
     figures = "outliers"
 
-    def __init__(self, conditions: Conditions) -> None:
-        super().__init__(conditions)
-        assert conditions.device.outliers is not None  # noqa: S101  (else it is not built)
-        self._share = conditions.device.outliers.share
-
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
         """Where the device has any."""
@@ -113,6 +98,6 @@ class SynchronisationOutliers(ShotEffect):
         random = np.random.Generator(
             np.random.SFC64(np.random.SeedSequence((shot.seed, shot.number, 0x0071)))
         )
-        if random.random() < self._share:
+        if random.random() < self._figures.share:
             part = random.uniform(0.2, 1.0)
             shot.factor *= (1 - part) + part * complex(np.exp(2j * np.pi * random.random()))

@@ -85,11 +85,9 @@ class LensScatter(PlaneEffect):
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
-        scatter = conditions.device.lens_scatter
-        assert scatter is not None  # noqa: S101  (else it is not built)
         height, width = conditions.shape
-        self._share = scatter.share
-        sigma = scatter.width * width
+        self._share = self._figures.share
+        sigma = self._figures.width * width
         self._rows, self._columns = _spread(height, sigma), _spread(width, sigma)
 
     @classmethod

@@ -26,8 +26,7 @@ class PixelPattern(PlaneEffect):
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
-        pattern = conditions.device.pattern
-        assert pattern is not None  # noqa: S101  (else it is not built)
+        pattern: Pattern = self._figures
         random = np.random.Generator(
             np.random.SFC64(np.random.SeedSequence((conditions.device.seed, 0x9A77)))
         )

@@ -15,7 +15,6 @@ from prometheus_client.registry import Collector
 import transientcam_moments as tm
 from transientcam_server.camera import CameraLostEvent, CameraRecoveredEvent, Captured, Event
 from transientcam_server.imaging import NOMINAL_ID
-from transientcam_server.recording import Library
 from transientcam_server.service import Service
 
 CONTENT_TYPE: Final = prometheus.CONTENT_TYPE_LATEST
@@ -65,8 +64,6 @@ class Metrics:
         self.losses = 0
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
-        self.registry.register(RecordingCollector(service.recordings))
-        self.registry.register(RelayCollector(service))
         prometheus.ProcessCollector(registry=self.registry)
         prometheus.PlatformCollector(registry=self.registry)
         prometheus.GCCollector(registry=self.registry)
@@ -122,6 +119,8 @@ class _ServiceCollector(Collector):
         yield from self._history()
         yield from self._calibration()
         yield from self._clients()
+        yield from self._recordings()
+        yield from self._relay()
 
     def _build(self) -> Iterator[Metric]:
         capabilities = self._service.camera.capabilities
@@ -234,16 +233,8 @@ class _ServiceCollector(Collector):
         )
         yield _gauge("lease_held", "Whether a client holds the lease.", lease is not None)
 
-
-class RecordingCollector(Collector):
-    """Collects what a library counts anyway."""
-
-    def __init__(self, library: Library) -> None:
-        self._library = library
-
-    def collect(self) -> Iterator[Metric]:
-        """Return the values of this moment."""
-        library, totals = self._library, self._library.totals
+    def _recordings(self) -> Iterator[Metric]:
+        library, totals = self._service.recordings, self._service.recordings.totals
         yield _gauge(
             "recording_active", "Whether frames are being recorded.", library.active_id is not None
         )
@@ -269,15 +260,7 @@ class RecordingCollector(Collector):
                 free_bytes,
             )
 
-
-class RelayCollector(Collector):
-    """Collects what a relay counts anyway, and the hops of the last frame."""
-
-    def __init__(self, service: Service) -> None:
-        self._service = service
-
-    def collect(self) -> Iterator[Metric]:
-        """Return the values of this moment."""
+    def _relay(self) -> Iterator[Metric]:
         relay = self._service.relay
         if relay is None:
             return

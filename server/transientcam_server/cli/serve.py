@@ -13,6 +13,7 @@ import typer
 
 from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, Text, echo
+from transientcam_server.cli.options import ConfigOption, HostOption, PortOption
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera
@@ -34,19 +35,13 @@ def serve(
             autocompletion=lambda: _camera_names(),
         ),
     ] = None,
-    host: Annotated[
-        str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
-    ] = None,
-    port: Annotated[
-        int | None, typer.Option(help="TCP port; 0 takes any free one.  [default: 8000]")
-    ] = None,
+    host: HostOption = None,
+    port: PortOption = None,
     calibration: Annotated[
         Path | None,
         typer.Option(help="A file of `transientcam calibrate`.  [default: nominal gains]"),
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
-    ] = None,
+    config: ConfigOption = None,
     device: Annotated[
         str | None,
         typer.Option(help="What computes frames: cpu, gpu, gpu:NAME or auto.  [default: cpu]"),

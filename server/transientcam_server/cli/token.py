@@ -10,14 +10,12 @@ import typer
 
 from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, echo
+from transientcam_server.cli.options import ConfigOption
 
 app = typer.Typer(
     no_args_is_help=True, help="Create and revoke the tokens that give access to this camera."
 )
 
-_Config = Annotated[
-    Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
-]
 _File = Annotated[
     Path | None,
     typer.Option("--tokens-file", help="File of the tokens, if not the configured one."),
@@ -42,7 +40,7 @@ def create(
             "[default: operators and admins may]"
         ),
     ] = None,
-    config: _Config = None,
+    config: ConfigOption = None,
     tokens_file: _File = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -72,7 +70,7 @@ def create(
 
 @app.command("list")
 def list_tokens(
-    config: _Config = None, tokens_file: _File = None, as_json: JsonOption = False
+    config: ConfigOption = None, tokens_file: _File = None, as_json: JsonOption = False
 ) -> None:
     """List the tokens: ids, names, roles and ends, not the secrets."""
     from transientcam_server.api import TokenFile, utc_now
@@ -99,7 +97,7 @@ def list_tokens(
 @app.command()
 def revoke(
     token_id: Annotated[str, typer.Argument(metavar="ID", help="As `token list` shows it.")],
-    config: _Config = None,
+    config: ConfigOption = None,
     tokens_file: _File = None,
     as_json: JsonOption = False,
 ) -> None:
