@@ -1,6 +1,7 @@
 """Returns from a device against 60 decimal digits."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import mpmath as mp
 import numpy as np
@@ -23,7 +24,7 @@ def device(request: pytest.FixtureRequest) -> Iterator[CountingDevice]:
         yield found
 
 
-def returns_of(b: np.ndarray) -> list[tuple[mp.mpf, mp.mpf]]:
+def returns_of(b: np.ndarray) -> list[tuple[Any, Any]]:
     """Phase and weight of the returns that are left of moments without their uniform part."""
     values, vectors = mp.eighe(exact.toeplitz(exact.exactly(b)))
     b0, m = mp.re(exact.exactly(b)[0]) - values[0], len(b) - 1
