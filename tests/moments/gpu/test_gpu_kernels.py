@@ -14,7 +14,6 @@ from tests.moments.kernels.test_kernels_reconstruct import (  # noqa: F401 - col
     test_a_result_stays_as_it_is_while_later_frames_come,
     test_another_estimator_s_range_and_light_are_its_own_in_a_pass,
     test_every_order_has_its_pass,
-    test_frames_at_the_same_time_do_not_disturb_each_other,
     test_light_is_complete,
     test_moments_are_reconstructed_alike,
     test_moments_whose_density_overflows_are_flagged_alike,

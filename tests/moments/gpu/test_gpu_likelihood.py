@@ -49,8 +49,7 @@ class TestOfTheKernel:
     )
 
 
-@pytest.mark.parametrize("hostile", [False, True])
-@pytest.mark.parametrize("m", [1, 2, 4])
+@pytest.mark.parametrize(("m", "hostile"), [(1, True), (2, False), (4, True)])
 def test_likelihoods_are_right_with_the_worst_quotients_that_a_device_may_have(
     m: int, hostile: bool
 ) -> None:
