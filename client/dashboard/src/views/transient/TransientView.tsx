@@ -9,7 +9,7 @@ import { AMPLITUDE } from "../../store/mapCatalogue";
 import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
 import { Button, Check, Choice, Tabs } from "../../ui/controls";
-import { savePicture } from "../../ui/download";
+import { saveNumbers, savePicture } from "../../ui/download";
 import { captionOf, timeWords } from "../../ui/figure";
 import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
@@ -81,6 +81,7 @@ export function TransientView() {
           },
         },
         ...filming.actions(subject, store),
+        { text: "Coefficients (NPY)", run: () => saveNumbers(store.api, frame.peek()) },
       ]}
       tools={
         <>
