@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { npy } from "../../../client/dashboard/src/ui/download";
+import { npy, tableText } from "../../../client/dashboard/src/ui/download";
 
 describe("an NPY file", () => {
   test.each([
@@ -24,4 +24,13 @@ describe("an NPY file", () => {
     const bytes = npy(all.subarray(1, 3), [2]);
     expect([...new Float32Array(bytes.slice(-8).buffer)]).toEqual([2, 3]);
   });
+});
+
+test("a table has names with units, a line for each row, and nothing where there is no number", () => {
+  const rows = [
+    ["harmonics", "range_std_m", "within_share"],
+    [3, 0.001, null],
+    [4, 0.0005, Number.NaN],
+  ];
+  expect(tableText(rows)).toBe("harmonics,range_std_m,within_share\n3,0.001,\n4,0.0005,\n");
 });

@@ -54,3 +54,16 @@ test("arrivals are marked where most light comes, not where it only trembles", (
   expect(peaksOf(arrivals).map((turn) => Math.round(96 * turn) / 96)).toEqual([25 / 96, 60 / 96]);
   expect(peaksOf(new Float32Array(192))).toEqual([]);
 });
+
+test("light that stays in sight shortens the gaps behind it, and no others", () => {
+  const arrivals = [0, 0, 1, 0, 0, 0, 0, 1, 0, 0];
+  expect(gapsOf(arrivals).map(({ first, last }) => [first, last])).toEqual([
+    [0, 0.2],
+    [0.3, 0.7],
+    [0.8, 1],
+  ]);
+  expect(gapsOf(arrivals, 0.2).map(({ first, last }) => [first, last])).toEqual([
+    [0, 0.2],
+    [0.5, 0.7],
+  ]);
+});

@@ -16,7 +16,7 @@ export const NAMES: Readonly<Record<Play, string>> = {
 };
 
 /** Length of the gate, in time of flight. */
-const GATE_S = 1e-9;
+export const GATE_S = 1e-9;
 
 /** Phase at which the gate opens that closes at a phase; a flight begins with its period. */
 export function gateStart_rad(phase_rad: number, period_s: number): number {

@@ -49,10 +49,3 @@ export class Series {
     await followed(this.api, started, (job) => (this.job.value = job));
   }
 }
-
-/** Names with units, and a line for each row. */
-export function csvOf(rows: readonly SeriesRow[]): string {
-  return [Object.keys(rows[0]), ...rows.map((row) => Object.values(row).map((value) => value ?? ""))]
-    .map((line) => `${line.join()}\r\n`)
-    .join("");
-}

@@ -2,6 +2,7 @@ import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 
 import { type Action, type ActionGroup, ActionMenu } from "./ActionMenu";
+import { type PlotWords, plotFiles } from "./drawing";
 import "./Panel.css";
 
 interface PanelProps {
@@ -10,6 +11,8 @@ interface PanelProps {
   readonly tools?: ComponentChildren;
   /** Files that can be made of what the view shows. */
   readonly downloads?: readonly Action[];
+  /** What is written around its plot in a figure. */
+  readonly plot?: (() => PlotWords) | undefined;
   readonly children: ComponentChildren;
 }
 
@@ -20,8 +23,9 @@ export const DRAGGED = "application/x-transientcam-view";
 export const SlotContext = createContext<readonly ActionGroup[]>([]);
 
 /** The frame around a view: a title, its tools, its content. */
-export function Panel({ name, title, tools, downloads = [], children }: PanelProps) {
+export function Panel({ name, title, tools, downloads = [], plot, children }: PanelProps) {
   const slot = useContext(SlotContext);
+  const files = [...(plot === undefined ? [] : plotFiles(name, plot)), ...downloads];
   return (
     <section class={`panel column panel-${name}`} aria-label={name} data-view={name}>
       <header class="panel-head row apart">
@@ -31,7 +35,7 @@ export function Panel({ name, title, tools, downloads = [], children }: PanelPro
         </div>
         <div class="panel-tools wrapped spaced">
           {tools}
-          <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: downloads }, ...slot]} />
+          <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: files }, ...slot]} />
         </div>
       </header>
       {children}

@@ -13,11 +13,18 @@ export function save(name: string, content: Blob): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** Hands a table out, comma-separated: names with their units first, and nothing where there is no value. */
-export function saveTable(name: string, rows: readonly (readonly (string | number | null | undefined)[])[]): void {
-  const cell = (value: string | number | null | undefined): string => (value == null || Number.isNaN(value) ? "" : String(value));
-  const lines = rows.map((row) => `${row.map(cell).join(",")}\n`);
-  save(`${name}.csv`, new Blob(lines, { type: "text/csv" }));
+/** Rows of a table, the first of which has the names of the columns with their units. */
+export type Rows = readonly (readonly (string | number | null | undefined)[])[];
+
+/** A table, comma-separated; nothing where there is no value. */
+export function tableText(rows: Rows): string {
+  const cell = (value: Rows[number][number]): string => (value == null || Number.isNaN(value) ? "" : String(value));
+  return rows.map((row) => `${row.map(cell).join(",")}\n`).join("");
+}
+
+/** Hands a table out. */
+export function saveTable(name: string, rows: Rows): void {
+  save(`${name}.csv`, new Blob([tableText(rows)], { type: "text/csv" }));
 }
 
 /**

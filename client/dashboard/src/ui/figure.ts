@@ -107,7 +107,8 @@ function mark(x: number, y: number, to: "down" | "left" | "right", words: string
   return line + text(x + 1.75 * dx, y + 4, words, to === "left" ? 'text-anchor="end"' : "");
 }
 
-function text(x: number, y: number, words: string, attributes = ""): string {
+/** Words of an SVG, whatever stands in them. */
+export function text(x: number, y: number, words: string, attributes = ""): string {
   return `<text x="${x}" y="${y}" ${attributes}>${words.replace(/&/g, "&amp;").replace(/</g, "&lt;")}</text>`;
 }
 

@@ -20,19 +20,32 @@ async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts:
   const [columns, rows] = [canvas.width, canvas.height];
   const layout = figureLayout(columns, rows, FIGURE_PX);
   const svg = figureSvg({ ...parts, columns, rows, picture: canvas.toDataURL("image/png") }, layout);
+  // Pixel by pixel: a browser may smooth what is within an SVG.
+  await saveDrawing(name, svg, layout, kind, (context) => {
+    context.imageSmoothingEnabled = false;
+    context.drawImage(canvas, layout.left, layout.top, layout.pictureWidth, layout.pictureHeight);
+  });
+}
+
+/** Hands an SVG out, as it is or as a PNG; `paint` paints over that before this returns, and so before anything moves. */
+export async function saveDrawing(
+  name: string,
+  svg: string,
+  { width, height }: Readonly<{ width: number; height: number }>,
+  kind: "png" | "svg",
+  paint: (context: CanvasRenderingContext2D) => void = () => {},
+): Promise<void> {
   if (kind === "svg") {
     save(`${name}.svg`, new Blob([svg], { type: "image/svg+xml" }));
     return;
   }
   const drawn = document.createElement("canvas");
-  [drawn.width, drawn.height] = [PNG_SCALE * layout.width, PNG_SCALE * layout.height];
+  [drawn.width, drawn.height] = [PNG_SCALE * width, PNG_SCALE * height];
   const context = drawn.getContext("2d") as CanvasRenderingContext2D;
-  // The picture first, before anything moves, and pixel by pixel: a browser may smooth what is within an SVG.
-  context.imageSmoothingEnabled = false;
   context.scale(PNG_SCALE, PNG_SCALE);
-  context.drawImage(canvas, layout.left, layout.top, layout.pictureWidth, layout.pictureHeight);
+  paint(context);
   context.globalCompositeOperation = "destination-over";
-  context.drawImage(await imageOf(svg), 0, 0, layout.width, layout.height);
+  context.drawImage(await imageOf(svg), 0, 0, width, height);
   const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
 }

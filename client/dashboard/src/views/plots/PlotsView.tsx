@@ -4,7 +4,9 @@ import type uPlot from "uplot";
 import { oneOf, type Setting } from "../../store/settings";
 import { type Store, useStore } from "../../store/store";
 import { Tabs } from "../../ui/controls";
-import { savePicture, saveTable } from "../../ui/download";
+import { saveTable } from "../../ui/download";
+import type { PlotWords } from "../../ui/drawing";
+import { captionOf } from "../../ui/figure";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { History, KEPT_S } from "./history";
@@ -39,21 +41,24 @@ export function PlotsView() {
     const [along, ...lines] = data.peek();
     const names = side.peek() === "time" ? placesOf(store).map((place) => place.name.replace(", ", "_")) : [name];
     const head = [side.peek() === "time" ? "time_s" : "distance_px", ...names.map((each) => `${product}_${each}_${unit}`.toLowerCase())];
-    saveTable(`${product}-${side.peek()}`, [head, ...[...along].map((at, n) => [at, ...lines.map((line) => line[n])])]);
+    saveTable(words().name, [head, ...[...along].map((at, n) => [at, ...lines.map((line) => line[n])])]);
+  };
+  const words = (): PlotWords => {
+    const meta = look.frame.peek()?.meta;
+    const title = `${name} ${side.peek() === "time" ? `over the last ${KEPT_S} s` : "along the line from A to B"}`;
+    return { name: `${product}-${side.peek()}`, title, caption: meta ? captionOf(meta, store.sequence.peek()) : "" };
   };
   return (
     <Panel
       name="plots"
+      plot={words}
       title={
         <h2>
           Values <span class="quiet">of {name.toLowerCase()}</span>
         </h2>
       }
       tools={<Tabs label="What of the values" value={side.value} options={SIDES} onChange={(value) => (side.value = value)} />}
-      downloads={[
-        { text: "Picture (PNG)", run: () => savePicture(`${product}-${side.peek()}`, document.querySelector(".line-chart canvas")) },
-        { text: "Values (CSV)", run: csv },
-      ]}
+      downloads={[{ text: "Values (CSV)", run: csv }]}
     >
       <div class="plots column grow spaced">
         {side.value === "time" ? <OverTime key={key} look={look} data={data} /> : <AlongLine key={key} look={look} data={data} />}

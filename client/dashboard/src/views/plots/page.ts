@@ -5,6 +5,7 @@ import { useEffect } from "preact/hooks";
 import type uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
+import { register } from "../../ui/drawing";
 import { useDrawing, useSize } from "../../ui/hooks";
 import "./page.css";
 
@@ -44,6 +45,7 @@ export function usePlot<T extends { readonly plot: uPlot }>(
   useEffect(() => {
     if (box.current === null) return undefined;
     const now = make(box.current);
+    register(now.plot);
     made.value = now;
     return () => {
       made.value = null;

@@ -11,13 +11,15 @@ import type { Lit } from "../../store/player";
 import { aBoolean, type Setting } from "../../store/settings";
 import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
-import { save, savePicture } from "../../ui/download";
+import { saveTable } from "../../ui/download";
+import type { PlotWords } from "../../ui/drawing";
 import { FirstFrame } from "../../ui/FirstFrame";
+import { captionOf } from "../../ui/figure";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { usePlot } from "../plots/page";
 import { litOf, steady } from "../transient/arrivals";
-import { csvOf, drawnOf, type Subject } from "./curves";
+import { drawnOf, rowsOf, type Subject } from "./curves";
 import { FlagHistory } from "./flagShares";
 import { richestPixel } from "./interesting";
 import { FlagWords, Found } from "./Listings";
@@ -70,15 +72,20 @@ export function ResponseView() {
     const now = shown.peek();
     if (now === null) return;
     const truth = store.details.document.peek()?.truth ?? null;
-    const name = `pixel-${now.pixel.x}-${now.pixel.y}-${aspect}-${looked.peek()?.meta.frame ?? 0}.csv`;
-    save(name, new Blob([csvOf(drawnOf(aspect, now, store.measures.pins.peek(), truth))], { type: "text/csv" }));
+    saveTable(nameOf(aspect), rowsOf(drawnOf(aspect, now, store.measures.pins.peek(), truth)));
   };
+  const nameOf = (what: string): string => `pixel-${place.peek()?.replace(", ", "-")}-${what}-${looked.peek()?.meta.frame ?? 0}`;
   const files = ASPECTS.map(({ value, text }) => ({ text: `${text} (CSV)`, run: download(value) }));
-  files.push({ text: "Picture (PNG)", run: () => savePicture(`pixel-${place.peek()}`, document.querySelector(".response-plot canvas")) });
+  const words = (): PlotWords => {
+    const meta = looked.peek()?.meta;
+    const title = `${SIDES.find(({ value }) => value === side.peek())?.text} at pixel ${place.peek()}`;
+    return { name: nameOf(side.peek()), title, caption: meta ? captionOf(meta, store.sequence.peek()) : "" };
+  };
   return (
     <Panel
       name="response"
       downloads={shown.value === null ? [] : files}
+      plot={shown.value === null || side.value === "moments" ? undefined : words}
       title={
         <h2>
           Impulse response <span class="quiet">{place.value === null ? "" : `of pixel ${place.value}`}</span>

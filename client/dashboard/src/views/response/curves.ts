@@ -5,6 +5,7 @@ import { Poles } from "../../physics/poles";
 import { boundsAt, pixelOf, poissonKernel } from "../../physics/reflection";
 import type { Pin, PinName } from "../../store/measures";
 import type { PixelDocument } from "../../stream/documents";
+import type { Rows } from "../../ui/download";
 import type { Aspect } from "./sides";
 
 export type Truth = NonNullable<PixelDocument["truth"]>;
@@ -98,8 +99,8 @@ function wholeOf(truth: Truth | null): Truth | null {
   return listed >= COMPLETE * truth.brightness ? truth : null;
 }
 
-/** A table of the curves: comma-separated, one line a time, units in the names of the columns. */
-export function csvOf({ curves: { aspect, time_ns, lines }, ofPins }: Drawn): string {
+/** A table of the curves: a row a time, units in the names of the columns. */
+export function rowsOf({ curves: { aspect, time_ns, lines }, ofPins }: Drawn): Rows {
   const unit = aspect === "cumulative" ? "dn" : "dn_per_ns";
   const estimate = LINES[aspect][ESTIMATES[aspect]];
   const named = [
@@ -107,9 +108,9 @@ export function csvOf({ curves: { aspect, time_ns, lines }, ofPins }: Drawn): st
     ...Array.from(ofPins, ([name, line]) => ({ line, name: `pin_${name.toLowerCase()}_${estimate}` })),
   ];
   const kept = named.filter(({ line }) => line.some((value) => !Number.isNaN(value)));
-  const head = ["time_ns", ...kept.map(({ name }) => `${name}_${unit}`)].join(",");
-  const rows = Array.from(time_ns, (time, n) =>
-    [time, ...kept.map(({ line }) => line[n])].map((value) => (Number.isNaN(value) ? "" : String(Number(value.toPrecision(9))))).join(","),
-  );
-  return `${[head, ...rows].join("\n")}\n`;
+  const head = ["time_ns", ...kept.map(({ name }) => `${name}_${unit}`)];
+  return [
+    head,
+    ...Array.from(time_ns, (time, n) => [time, ...kept.map(({ line }) => line[n])].map((value) => Number(value.toPrecision(9)))),
+  ];
 }

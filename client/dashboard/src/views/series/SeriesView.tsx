@@ -3,10 +3,10 @@ import { useEffect } from "preact/hooks";
 import { engineering, fixed, numberOf } from "../../scales/format";
 import { hasEnded } from "../../store/jobs";
 import { askedRegion } from "../../store/measures";
-import { csvOf, type SeriesRow } from "../../store/series";
+import type { SeriesRow } from "../../store/series";
 import { useStore } from "../../store/store";
 import { Button, Form, NumberField, TextField } from "../../ui/controls";
-import { save } from "../../ui/download";
+import { saveTable } from "../../ui/download";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -47,7 +47,7 @@ export function SeriesView() {
     const region = askedRegion(measures.region.value);
     void task.run("", () => series.start({ settings, frames: numberOf(frames.value), target_m: numberOf(target_mm.value) * 1e-3, region }));
   };
-  const csv = (): void => save(`series-${series.id.value}.csv`, new Blob([csvOf(rows)], { type: "text/csv" }));
+  const csv = (): void => saveTable(`series-${series.id.value}`, [Object.keys(rows[0]), ...rows.map((row) => Object.values(row))]);
   return (
     <Panel name="series" title={<h2>Series</h2>} downloads={rows.length === 0 ? [] : [{ text: "Table (CSV)", run: csv }]}>
       <div class="panel-body column grow fades">

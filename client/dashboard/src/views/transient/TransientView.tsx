@@ -4,12 +4,12 @@ import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { fixed, significant } from "../../scales/format";
-import { gateStart_rad, NAMES, type Play, type TransientLook } from "../../store/lightLook";
+import { GATE_S, gateStart_rad, NAMES, type Play, type TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
 import { Button, Check, Choice, Tabs } from "../../ui/controls";
-import { savePicture } from "../../ui/download";
+import { saveNumbers, savePicture } from "../../ui/download";
 import { captionOf, timeWords } from "../../ui/figure";
 import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
@@ -55,7 +55,8 @@ export function TransientView() {
     if (arrivals === undefined) return;
     player.learn(steady(player.lit.peek(), litOf(arrivals)), peaksOf(arrivals));
     // What is gathered over a time stays in sight.
-    player.gaps.value = look.play.value === "density" ? gapsOf(arrivals) : [];
+    const trail = look.play.value === "gate" ? GATE_S / store.period_s.value : 0;
+    player.gaps.value = look.play.value === "cumulative" ? [] : gapsOf(arrivals, trail);
   }, [frame, player]);
   const play = look.play.value;
   const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
@@ -81,6 +82,7 @@ export function TransientView() {
           },
         },
         ...filming.actions(subject, store),
+        { text: "Coefficients (NPY)", run: () => saveNumbers(store.api, frame.peek()) },
       ]}
       tools={
         <>

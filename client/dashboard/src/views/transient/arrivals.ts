@@ -34,9 +34,9 @@ export function litOf(arrivals: ArrayLike<number>): Lit | null {
   };
 }
 
-/** The parts of the period without light, in shares of it; none where there is no light at all. */
-export function gapsOf(arrivals: ArrayLike<number>): Lit[] {
-  const worth = worthOf(arrivals);
+/** The parts of the period without light, in shares of it; none where there is no light at all. Light stays in sight for `trail` of it. */
+export function gapsOf(arrivals: ArrayLike<number>, trail = 0): Lit[] {
+  const worth = worthOf(arrivals).map((_, at, all) => all.slice(Math.max(0, at - Math.floor(trail * all.length)), at + 1).includes(true));
   const lit = worth.flatMap((is, at) => (is ? [at] : []));
   const after = [...lit, worth.length];
   const gaps = [-1, ...lit].map((at, n) => ({ first: (at + 1) / worth.length, last: after[n] / worth.length }));

@@ -5,7 +5,7 @@ import { drawnOf, type Frame, sentOf } from "../../store/frames";
 import { aBoolean, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
-import { saveNumbers, savePicture } from "../../ui/download";
+import { type Rows, saveNumbers, savePicture, saveTable } from "../../ui/download";
 import { NEEDS } from "../../ui/flags";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
@@ -47,6 +47,10 @@ export function ValidityView() {
       }
       downloads={[
         { text: "Picture (PNG)", run: () => savePicture(`${reasons.product}-${frame.peek()?.meta.frame ?? 0}`, canvas.current) },
+        {
+          text: "Counts (CSV)",
+          run: () => saveTable(`${reasons.product}-${frame.peek()?.meta.frame ?? 0}`, countRows(reasons, frame.peek())),
+        },
         { text: `${trust.value ? "Trust" : "Flags"} (NPY)`, run: () => saveNumbers(store.api, frame.peek()) },
       ]}
     >
@@ -56,6 +60,14 @@ export function ValidityView() {
       <Legend key={reasons.product} frame={frame} reasons={reasons} />
     </Panel>
   );
+}
+
+/** How many pixels have each reason; no number where it could not be judged. */
+function countRows(reasons: Reasons, frame: Frame | null): Rows {
+  const { total, valid, byName } = countReasons(reasons, frame === null ? [] : sentOf(frame));
+  const unjudged = reasons.product === "trust" ? (frame?.meta.accuracy?.not_judged ?? []) : [];
+  const named = Object.entries({ good: valid, ...byName }).map(([name, count]) => [name, unjudged.includes(name) ? NaN : count] as const);
+  return [["name", "pixels", "share_percent"], ...named.map(([name, count]) => [name, count, (100 * count) / total])];
 }
 
 function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reasons: Reasons }) {
