@@ -28,8 +28,8 @@ os.environ["XLA_FLAGS"] = (
 )
 # every process that a test starts would compile all modules anew, which takes it a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# what starts the tests in the background has them ignore SIGINT, which every process that they start
-# would inherit, and then not end by it
+# what starts the tests in the background has them ignore SIGINT, which every process that they
+# start would inherit, and then not end by it
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # httpx gives up after 5 s, which a laden machine may take to answer; what hangs is ended by the
 # limit of each test
