@@ -96,7 +96,7 @@ class Acquisition:
         self._occupant: str | None = None
         self._restored: Sequence | None = None
         self._stopping = threading.Event()
-        self._ending, self._ended = threading.Lock(), False
+        self._ended = False
         self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
         self._running = True
         self._connected = True
@@ -229,11 +229,9 @@ class Acquisition:
             else:
                 future.set_result(result)
 
-        with self._ending:
-            if not self._ended:
-                self._commands.put(run)
-                return future
-        run()  # no thread would
+        self._commands.put(run)
+        if self._ended:
+            self._run_commands(wait_s=0.0)  # no thread would
         return future
 
     def status(self) -> AcquisitionStatus:
@@ -290,8 +288,7 @@ class Acquisition:
                 self._run_commands(wait_s=BACKOFF_S[-1])
         self._run_commands(wait_s=0.0)
         self._switch_off_at_end()
-        with self._ending:
-            self._ended = True
+        self._ended = True
         self._run_commands(wait_s=0.0)  # what was asked for meanwhile is refused
 
     def _beat(self) -> None:

@@ -29,7 +29,8 @@ FRAMES: Final = 20
 FAULTS: Final = ("EIO", "ENOSPC", "short")
 CALLS: Final = ("write", "pwrite", "fsync", "ftruncate")
 _FRAMES: Final = [frame(number) for number in range(FRAMES)]
-_IMAGE: Final = layout.image(header(), {})
+_IMAGES: Final[dict[str, bytes]] = {}
+_MADE: Final = layout.image
 
 
 @dataclass(frozen=True)
@@ -98,13 +99,17 @@ def record(directory: Path) -> Recorder:
 
 def tried(directory: Path, fault: Fault) -> str:
     """Record on such a disk, hold what is left against what was counted; return how it ended."""
-    with FailingDisk(fault).inserted(), mock.patch.object(layout, "image", _image):
+    with mock.patch.object(layout, "image", _image):
+        return _tried(directory, fault)
+
+
+def _tried(directory: Path, fault: Fault) -> str:
+    refused = None
+    with FailingDisk(fault).inserted():
         try:
             recorder = record(directory)
         except OSError as error:
             refused = error.strerror
-        else:
-            refused = None
     if refused is not None:
         assert refused == fault.words
         assert list(directory.iterdir()) == []
@@ -131,8 +136,11 @@ def require_kept(directory: Path, counted: int) -> None:
     path.unlink()
 
 
-def _image(_: object, __: object) -> bytes:
-    return _IMAGE  # of the same header always
+def _image(*of: Any) -> bytes:
+    """Return what a file begins with, made once for each header: making it takes longest."""
+    if repr(of) not in _IMAGES:
+        _IMAGES[repr(of)] = _MADE(*of)
+    return _IMAGES[repr(of)]
 
 
 def calls(directory: Path) -> int:
