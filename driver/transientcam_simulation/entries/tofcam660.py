@@ -6,19 +6,7 @@ from dataclasses import replace
 from typing import Any, Final, get_args
 
 from transientcam_driver.camera import Camera, CameraName, CameraPlugin, FoundCamera
-from transientcam_driver.cameras.tofcam660 import (
-    CONTROL_PORT,
-    DEFAULT_ADDRESS,
-    FULL,
-    SETTLE_S,
-    AnswerType,
-    Command,
-    ControlConnection,
-    DataOver,
-    DeviceOptions,
-    Region,
-    Tofcam660,
-)
+from transientcam_driver.cameras import tofcam660
 from transientcam_driver.cameras.triggered import TriggeredCamera
 from transientcam_driver.clock import Clock
 from transientcam_driver.errors import CameraError, SequenceError, SpecError
@@ -38,21 +26,21 @@ _OPTIONS: Final = {
     "data": "tcp or udp: what images travel over; auto is tcp where the firmware has it",
     "region": "LEFT,TOP,RIGHT,BOTTOM: the part of the sensor that is read; TOP is 240 - BOTTOM",
     "multiples": "J,J,...: which multiples of the base frequency are measured, 1 to m without it",
-    "settle_s": f"time for each change of the frequency, {SETTLE_S:g} s without it",
+    "settle_s": f"time for each change of the frequency, {tofcam660.SETTLE_S:g} s without it",
     "answer_s": "longest time for an answer",
     "image_s": "longest time for an image",
 }
 
 
-def device_options(name: CameraName) -> DeviceOptions:
+def device_options(name: CameraName) -> tofcam660.DeviceOptions:
     """Read how the camera of a name is used. Raises SpecError naming the part that is not valid."""
     emulated = name.address == EMULATED
-    data_over: Any = name.choice("data", get_args(DataOver))
-    return DeviceOptions(
+    data_over: Any = name.choice("data", get_args(tofcam660.DataOver))
+    return tofcam660.DeviceOptions(
         data_over=data_over,
         region=_region(name),
         multiples=_multiples(name),
-        settle_s=name.number("settle_s", SETTLE_S, least=0.0, most=10.0),
+        settle_s=name.number("settle_s", tofcam660.SETTLE_S, least=0.0, most=10.0),
         answer_s=name.number(
             "answer_s", _EMULATED_ANSWER_S if emulated else 1.0, least=0.01, most=600.0
         ),
@@ -60,13 +48,13 @@ def device_options(name: CameraName) -> DeviceOptions:
     )
 
 
-def _region(name: CameraName) -> Region:
+def _region(name: CameraName) -> tofcam660.Region:
     text = name.options.get("region")
     if text is None:
-        return FULL
+        return tofcam660.FULL
     parts = text.split(",")
     if len(parts) == 4 and all(each.isascii() and each.isdigit() for each in parts):
-        region = Region(*(int(each[:6]) for each in parts))
+        region = tofcam660.Region(*(int(each[:6]) for each in parts))
         if region.possible:
             return region
     limit = "LEFT,TOP,RIGHT,BOTTOM within 320 x 240 pixels, with TOP = 240 - BOTTOM"
@@ -89,15 +77,15 @@ def _open(name: CameraName, clock: Clock) -> Camera:
     options = device_options(name)
     if name.address != EMULATED:
         _require_real(name)
-        return TriggeredCamera(lambda: Tofcam660(name.address, options), clock=clock)
+        return TriggeredCamera(lambda: tofcam660.Tofcam660(name.address, options), clock=clock)
     wanted = simulated_scene(name)
     emulated, simulation = build_tofcam660(wanted.load(), seed=wanted.seed, clock=clock)
     there = replace(
         options, control_port=emulated.control_port, data_port=emulated.data_port, udp_port=0
     )
 
-    def connect() -> Tofcam660:
-        device = Tofcam660(emulated.host, there)
+    def connect() -> tofcam660.Tofcam660:
+        device = tofcam660.Tofcam660(emulated.host, there)
         emulated.udp_port = device.udp_port
         return device
 
@@ -110,7 +98,9 @@ def _open(name: CameraName, clock: Clock) -> Camera:
 
 def _require_real(name: CameraName) -> None:
     if not name.address:
-        raise SpecError(name.spec, f"it names no address (the factory's is {DEFAULT_ADDRESS})")
+        raise SpecError(
+            name.spec, f"it names no address (the factory's is {tofcam660.DEFAULT_ADDRESS})"
+        )
     require_no_emulation(name)
 
 
@@ -129,14 +119,16 @@ def _find() -> Iterator[FoundCamera]:
 def _find_on_network() -> Iterator[FoundCamera]:
     """Look at the factory's address: a TOFcam660 does not announce itself."""
     try:
-        control = ControlConnection(DEFAULT_ADDRESS, CONTROL_PORT, answer_s=_LOOK_S)
+        control = tofcam660.ControlConnection(
+            tofcam660.DEFAULT_ADDRESS, tofcam660.CONTROL_PORT, answer_s=_LOOK_S
+        )
         with closing(control):
-            answer = control.exchange(Command.READ_CHIP)
-            wafer, chip = answer.fields(AnswerType.CHIP, "!HH")
+            answer = control.exchange(tofcam660.Command.READ_CHIP)
+            wafer, chip = answer.fields(tofcam660.AnswerType.CHIP, "!HH")
     except CameraError:
         return
-    spec = f"tofcam660:{DEFAULT_ADDRESS}"
-    yield FoundCamera(spec, f"{wafer}-{chip}", "ESPROS TOFcam660", DEFAULT_ADDRESS)
+    spec = f"tofcam660:{tofcam660.DEFAULT_ADDRESS}"
+    yield FoundCamera(spec, f"{wafer}-{chip}", "ESPROS TOFcam660", tofcam660.DEFAULT_ADDRESS)
 
 
 def _facts(name: CameraName) -> Iterator[tuple[str, str]]:
@@ -144,7 +136,7 @@ def _facts(name: CameraName) -> Iterator[tuple[str, str]]:
     if name.address == EMULATED:
         return
     _require_real(name)
-    with closing(Tofcam660(name.address, device_options(name))) as device:
+    with closing(tofcam660.Tofcam660(name.address, device_options(name))) as device:
         yield from device.facts()
 
 

@@ -17,21 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Lens, ProtocolError, RawFrame, Sequence
-from transientcam_driver.cameras.kinect2 import (
-    FRAME_RATE_HZ,
-    HEIGHT,
-    MEASURED,
-    RESPONSE_BYTES,
-    SUB_IMAGE_BYTES,
-    SUB_IMAGES,
-    WIDTH,
-    DepthParameters,
-    Identity,
-    P0Tables,
-    Rows,
-    capabilities_of,
-    codes,
-)
+from transientcam_driver.cameras import kinect2
 from transientcam_server.errors import InputError
 from transientcam_server.imaging import FACTORY_ID, Intrinsics
 from transientcam_server.recording import Header, RecordingWriter, open_unknown
@@ -60,13 +46,13 @@ def import_kinect2(
     written.
     """
     began_s = source.stat().st_mtime
-    size: Any = {"width": WIDTH, "height": HEIGHT}
+    size: Any = {"width": kinect2.WIDTH, "height": kinect2.HEIGHT}
     seen = None if lens is None else Intrinsics.of_lens(lens, **size, source="camera")
     with _opened(source) as file:
         tables = _tables(file, source)
         numbers = _frames(file, source)
-        identity = Identity("not recorded", source.stem[:64], b"", b"")
-        capabilities = capabilities_of(identity)
+        identity = kinect2.Identity("not recorded", source.stem[:64], b"", b"")
+        capabilities = kinect2.capabilities_of(identity)
         applied = capabilities.apply(capabilities.nearest(Sequence()), epoch=1)
         header = Header(
             recording_id=re.sub(r"[^A-Za-z0-9_-]+", "-", f"import-{source.stem}")[:128],
@@ -84,16 +70,16 @@ def import_kinect2(
         try:
             for done, number in enumerate(numbers, start=1):
                 sub_images = _sub_images(file, source, number)
-                time_s = (number - numbers[0]) / FRAME_RATE_HZ
+                time_s = (number - numbers[0]) / kinect2.FRAME_RATE_HZ
                 writer.append(
                     RawFrame(
                         number=number,
                         epoch=applied.epoch,
-                        images=codes.frame_images(sub_images[:MEASURED]),
+                        images=kinect2.codes.frame_images(sub_images[: kinect2.MEASURED]),
                         labels=applied.labels,
                         device_time_s=time_s,
                         host_time_s=began_s + time_s,
-                        capture_s=1 / FRAME_RATE_HZ,
+                        capture_s=1 / kinect2.FRAME_RATE_HZ,
                         temperature_c=None,
                         lost_images=0,
                     )
@@ -109,7 +95,7 @@ def import_kinect2(
     return len(numbers)
 
 
-def read_lens(path: Path, rows: Rows = "top") -> Lens:
+def read_lens(path: Path, rows: kinect2.Rows = "top") -> Lens:
     """Read the lens of the depth camera from a file of calibrations.
 
     Raises InputError naming what of the file is not as expected; OSError if it cannot be read.
@@ -121,7 +107,7 @@ def read_lens(path: Path, rows: Rows = "top") -> Lens:
             stored = file[LENS][0]
             k1, k2, p1, p2, k3 = (float(each) for each in stored["distortion_coefficients"][:5])
             fx, _, cx, _, fy, cy, *_ = (float(each) for each in stored["intrinsic_camera_matrix"])
-            return DepthParameters(fx, fy, cx, cy, k1, k2, p1, p2, k3).lens(rows)
+            return kinect2.DepthParameters(fx, fy, cx, cy, k1, k2, p1, p2, k3).lens(rows)
         except (ValueError, TypeError, IndexError) as error:
             expected = "five coefficients of distortion and a matrix of 3 x 3"
             raise InputError(str(path), LENS, str(error), expected) from error
@@ -157,10 +143,10 @@ def _bytes(file: Any, path: Path, name: str, least: int, most: int) -> NDArray[n
     return values.view(np.uint8)
 
 
-def _tables(file: Any, path: Path) -> P0Tables:
-    response = _bytes(file, path, "P0Tables", RESPONSE_BYTES, _LONGEST_ANSWER)
+def _tables(file: Any, path: Path) -> kinect2.P0Tables:
+    response = _bytes(file, path, "P0Tables", kinect2.RESPONSE_BYTES, _LONGEST_ANSWER)
     try:
-        return P0Tables.unpack(response.tobytes())
+        return kinect2.P0Tables.unpack(response.tobytes())
     except ProtocolError as error:
         raise InputError(str(path), "P0Tables", str(error), "the camera's answer") from error
 
@@ -175,8 +161,15 @@ def _frames(file: Any, path: Path) -> list[int]:
 
 def _sub_images(file: Any, path: Path, number: int) -> NDArray[np.uint8]:
     name = f"Frame_{number}/Ir"
-    data = _bytes(file, path, name, MEASURED * SUB_IMAGE_BYTES, SUB_IMAGES * SUB_IMAGE_BYTES)
-    if len(data) % SUB_IMAGE_BYTES:
-        expected = f"{MEASURED} or {SUB_IMAGES} sub-images of {SUB_IMAGE_BYTES} bytes"
+    data = _bytes(
+        file,
+        path,
+        name,
+        kinect2.MEASURED * kinect2.SUB_IMAGE_BYTES,
+        kinect2.SUB_IMAGES * kinect2.SUB_IMAGE_BYTES,
+    )
+    if len(data) % kinect2.SUB_IMAGE_BYTES:
+        count = f"{kinect2.MEASURED} or {kinect2.SUB_IMAGES}"
+        expected = f"{count} sub-images of {kinect2.SUB_IMAGE_BYTES} bytes"
         raise InputError(str(path), name, f"{len(data)} bytes", expected)
-    return data.reshape((-1, SUB_IMAGE_BYTES))
+    return data.reshape((-1, kinect2.SUB_IMAGE_BYTES))

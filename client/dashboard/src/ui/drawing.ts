@@ -49,7 +49,7 @@ const [LETTER_PX, NAME_PX] = [6, 90];
 /** What uPlot knows of an axis once it has drawn it. */
 type DrawnAxis = uPlot.Axis & { readonly _splits?: readonly number[]; readonly _values?: readonly (string | null)[] };
 
-/** A plot of uPlot with vectors: axes, grid, bands and lines. */
+/** A plot of uPlot with vectors: axes, grid, bands, lines and what its hooks draw. */
 function plotSvg(plot: uPlot): string {
   const [left, top, wide, high] = [plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height].map((each) => each / devicePixelRatio);
   const foot = top + high;
@@ -93,10 +93,26 @@ function plotSvg(plot: uPlot): string {
     const name = there.length > 0 && typeof label === "string" && label !== "Value" ? label : "";
     return [below + line, text(left + NAME_PX * n, plot.height + 14, name, `fill="${ink}"`)] as const;
   });
+  const paths: string[] = [];
+  let path = "";
+  const nothing = (): void => {}; // all is cut at the plot's edge
+  const pen = {
+    canvas: { height: 0 },
+    strokeStyle: "",
+    lineWidth: 1,
+    beginPath: () => (path = ""),
+    moveTo: (x: number, y: number) => (path += `M${x} ${y}`),
+    lineTo: (x: number, y: number) => (path += `L${x} ${y}`),
+    stroke: () => paths.push(`<path d="${path}" stroke="${pen.strokeStyle}" stroke-width="${pen.lineWidth}"/>`),
+    ...{ save: nothing, restore: nothing, rect: nothing, clip: nothing, setLineDash: nothing },
+  };
+  const onPaper = Object.create(plot, { ctx: { value: pen } });
+  for (const draw of (plot.hooks.draw ?? []) as ((drawn: uPlot) => void)[]) draw(onPaper);
   return [
     ...axes,
     `<clipPath id="inside"><rect x="${left}" y="${top - 4}" width="${wide}" height="${high + 8}"/></clipPath>`,
-    `<g clip-path="url(#inside)">${bands.join("")}${drawn.map(([line]) => line).join("")}</g>`,
+    `<g clip-path="url(#inside)">${bands.join("")}${drawn.map(([line]) => line).join("")}`,
+    `<g transform="scale(${1 / devicePixelRatio})" fill="none">${paths.join("")}</g></g>`,
     ...drawn.map(([, name]) => name),
   ].join("");
 }

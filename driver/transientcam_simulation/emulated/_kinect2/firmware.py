@@ -8,26 +8,7 @@ import struct
 from collections import deque
 from typing import Final
 
-from transientcam_driver.cameras.kinect2 import (
-    COLOR_PARAMETERS_BYTES,
-    COMPLETION_MAGIC,
-    INITIALISE_STREAMS,
-    MODE_OFF,
-    MODE_ON,
-    MODE_ON_PLAIN,
-    READ_COLOR_PARAMETERS,
-    READ_FIRMWARE_VERSIONS,
-    READ_HARDWARE,
-    READ_P0,
-    READ_PARAMETERS,
-    READ_SERIAL,
-    READ_STATUS,
-    REQUEST_MAGIC,
-    STOP,
-    STREAMING_OFF,
-    STREAMING_ON,
-    Request,
-)
+from transientcam_driver.cameras import kinect2
 from transientcam_driver.errors import TransferStalled
 
 FIRMWARE: Final = (2, 3, 3913, 7)
@@ -48,12 +29,12 @@ class EmulatedFirmware:
         major, minor, revision, build = FIRMWARE
         version = struct.pack("<HHII4x", minor, major, revision, build)
         self._answers = {
-            _key(READ_FIRMWARE_VERSIONS): (bytes(48) + version).ljust(0x200, b"\0"),
-            _key(READ_HARDWARE): bytes(0x5C),
-            _key(READ_SERIAL): serial.encode("utf-16-le").ljust(0x80, b"\0"),
-            _key(READ_PARAMETERS): parameters,
-            _key(READ_P0): p0,
-            _key(READ_COLOR_PARAMETERS): b"\1".ljust(COLOR_PARAMETERS_BYTES, b"\0"),
+            _key(kinect2.READ_FIRMWARE_VERSIONS): (bytes(48) + version).ljust(0x200, b"\0"),
+            _key(kinect2.READ_HARDWARE): bytes(0x5C),
+            _key(kinect2.READ_SERIAL): serial.encode("utf-16-le").ljust(0x80, b"\0"),
+            _key(kinect2.READ_PARAMETERS): parameters,
+            _key(kinect2.READ_P0): p0,
+            _key(kinect2.READ_COLOR_PARAMETERS): b"\1".ljust(kinect2.COLOR_PARAMETERS_BYTES, b"\0"),
         }
         self._polls = polls
         self._polled = 0
@@ -78,14 +59,14 @@ class EmulatedFirmware:
         if len(data) < _HEADER.size or (len(data) - _HEADER.size) // 4 not in _PARAMETERS:
             raise TransferStalled
         magic, sequence, most_bytes, command, zero = _HEADER.unpack_from(data)
-        if magic != REQUEST_MAGIC or zero != 0:
+        if magic != kinect2.REQUEST_MAGIC or zero != 0:
             raise TransferStalled
         key = (command, *struct.unpack(f"<{len(data) // 4 - 5}I", data[_HEADER.size :]))
         self.requests.append(key)
         answer = self._answer(key)
         if answer:
             self._pending.append(answer[:most_bytes])
-        self._pending.append(struct.pack("<2I8x", COMPLETION_MAGIC, sequence))
+        self._pending.append(struct.pack("<2I8x", kinect2.COMPLETION_MAGIC, sequence))
 
     def read(self, most_bytes: int) -> bytes:
         """Return the next transfer of the answer endpoint.
@@ -99,16 +80,16 @@ class EmulatedFirmware:
     def _answer(self, key: tuple[int, ...]) -> bytes:
         if key in self._answers:
             return self._answers[key]
-        if key == _key(READ_STATUS):
+        if key == _key(kinect2.READ_STATUS):
             self._polled += self._woken
             return int(self._polled >= self._polls).to_bytes(4, "little")
-        if key in (_key(MODE_ON), _key(MODE_ON_PLAIN), _key(MODE_OFF)):
+        if key in (_key(kinect2.MODE_ON), _key(kinect2.MODE_ON_PLAIN), _key(kinect2.MODE_OFF)):
             self._woken = True
-        elif key == _key(INITIALISE_STREAMS) and self._polled >= self._polls:
+        elif key == _key(kinect2.INITIALISE_STREAMS) and self._polled >= self._polls:
             self._initialised = True
-        elif key == _key(STREAMING_ON) and self._initialised and not self.suspended:
+        elif key == _key(kinect2.STREAMING_ON) and self._initialised and not self.suspended:
             self._streaming = True
-        elif key in (_key(STREAMING_OFF), _key(STOP)):
+        elif key in (_key(kinect2.STREAMING_OFF), _key(kinect2.STOP)):
             self._streaming = self._initialised = self._woken = False
             self._polled = 0
         else:
@@ -116,5 +97,5 @@ class EmulatedFirmware:
         return b""
 
 
-def _key(request: Request) -> tuple[int, ...]:
+def _key(request: kinect2.Request) -> tuple[int, ...]:
     return request.command, *request.parameters
