@@ -16,6 +16,7 @@ Reported = tuple[str, str, str, str | None]
 
 _FRAMES: Final = 3
 _UNWATCHED: Final = "docs/operations.md says what switches the light off, and after how long"
+_BADGE: Final = "![camera contract](https://img.shields.io/badge/contract-{}_passed,_{}_failed,_{}_not_tried-{})"
 _REPORT: Final = "send this whole report, with --json, to the maintainer of the plug-in"
 
 
@@ -33,15 +34,19 @@ def checks(spec: str) -> Iterator[Reported]:
         yield "fault", "camera", str(error), None
         return
     bench = Bench.of(spec)
+    ended = dict.fromkeys(("ok", "fault", "not tried"), 0)
     for clause in CLAUSES:
+        level, message, remedy = "ok", clause.promise, None
         try:
             clause.run(bench)
         except ContractSkipped as skipped:
-            yield "not tried", clause.name, str(skipped), None
+            level, message = "not tried", str(skipped)
         except ContractBroken as broken:
-            yield "fault", clause.name, f"{clause.promise} But: {broken}", _REPORT
-        else:
-            yield "ok", clause.name, clause.promise, None
+            level, message, remedy = "fault", f"{clause.promise} But: {broken}", _REPORT
+        ended[level] += 1
+        yield level, clause.name, message, remedy
+    badge = _BADGE.format(*ended.values(), "red" if ended["fault"] else "green")
+    yield "ok", "for a README", badge, None
 
 
 def _capabilities(spec: str) -> Iterator[Reported]:
