@@ -2,7 +2,8 @@ import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 
 import { type Action, type ActionGroup, ActionMenu } from "./ActionMenu";
-import { type PlotWords, plotFiles } from "./drawing";
+import type { PlotWords } from "./drawing";
+import { plotFiles } from "./plotFiles";
 import "./Panel.css";
 
 interface PanelProps {

@@ -1,45 +1,25 @@
 /** Plots as figures that stand by themselves, in the colours of the page: whatever draws a plot, it is saved here. */
 import type uPlot from "uplot";
-import type { Action } from "./ActionMenu";
 import { text } from "./figure";
 import { saveDrawing } from "./figureFiles";
 
 /** What is written around a plot, and the name of its file. */
 export type PlotWords = Readonly<{ name: string; title: string; caption: string }>;
 
-/** Plots of uPlot, by their elements. */
-const PLOTS = new WeakMap<Element, uPlot>();
-
-/** Makes a plot known, so that it can be saved. */
-export function register(plot: uPlot): void {
-  PLOTS.set(plot.root, plot);
-}
-
-/** The plot of a panel as files: one of uPlot. */
-export function plotFiles(panel: string, words: () => PlotWords): Action[] {
-  const run = (kind: "png" | "svg") => (): void => {
-    const place = document.querySelector<HTMLElement>(`.panel-${panel}`);
-    const drawn = place?.querySelector(".uplot") ?? null;
-    const plot = drawn === null ? undefined : PLOTS.get(drawn);
-    if (place === null || drawn === null || plot === undefined) return;
-    const { name, title, caption } = words();
-    const { width, height } = drawn.getBoundingClientRect();
-    const style = getComputedStyle(place);
-    const size = { width: Math.ceil(Math.max(width, LETTER_PX * caption.length) + 2 * EDGE), height: Math.ceil(height + HEAD + FOOT) };
-    const svg = [
-      `<svg xmlns="http://www.w3.org/2000/svg" width="${size.width}" height="${size.height}" viewBox="0 0 ${size.width} ${size.height}" font-family="Inter, Helvetica, Arial, sans-serif" font-size="12" fill="${style.color}">`,
-      `<rect width="100%" height="100%" fill="${style.backgroundColor}"/>`,
-      text(EDGE, HEAD - 14, title, 'font-size="14" font-weight="600"'),
-      `<g transform="translate(${EDGE} ${HEAD})">${plotSvg(plot)}</g>`,
-      text(EDGE, size.height - 10, caption, 'font-size="11"'),
-      "</svg>",
-    ];
-    void saveDrawing(name, svg.join("\n"), size, kind);
-  };
-  return [
-    { text: "Figure (PNG)", run: run("png") },
-    { text: "Figure (SVG)", run: run("svg") },
+/** Hands a plot out. */
+export function savePlot(plot: uPlot, { name, title, caption }: PlotWords, kind: "png" | "svg"): void {
+  const { width, height } = plot.root.getBoundingClientRect();
+  const style = getComputedStyle(plot.root.closest(".panel") ?? plot.root);
+  const size = { width: Math.ceil(Math.max(width, LETTER_PX * caption.length) + 2 * EDGE), height: Math.ceil(height + HEAD + FOOT) };
+  const svg = [
+    `<svg xmlns="http://www.w3.org/2000/svg" width="${size.width}" height="${size.height}" viewBox="0 0 ${size.width} ${size.height}" font-family="Inter, Helvetica, Arial, sans-serif" font-size="12" fill="${style.color}">`,
+    `<rect width="100%" height="100%" fill="${style.backgroundColor}"/>`,
+    text(EDGE, HEAD - 14, title, 'font-size="14" font-weight="600"'),
+    `<g transform="translate(${EDGE} ${HEAD})">${plotSvg(plot)}</g>`,
+    text(EDGE, size.height - 10, caption, 'font-size="11"'),
+    "</svg>",
   ];
+  void saveDrawing(name, svg.join("\n"), size, kind);
 }
 
 const [EDGE, HEAD, FOOT] = [12, 34, 52];

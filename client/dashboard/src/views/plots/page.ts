@@ -5,8 +5,8 @@ import { useEffect } from "preact/hooks";
 import type uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
-import { register } from "../../ui/drawing";
 import { useDrawing, useSize } from "../../ui/hooks";
+import { PLOTS } from "../../ui/plotFiles";
 import "./page.css";
 
 /** The colours of the page where a plot stands, by their custom properties, and how its axes are drawn. */
@@ -45,7 +45,7 @@ export function usePlot<T extends { readonly plot: uPlot }>(
   useEffect(() => {
     if (box.current === null) return undefined;
     const now = make(box.current);
-    register(now.plot);
+    PLOTS.set(now.plot.root, now.plot);
     made.value = now;
     return () => {
       made.value = null;
