@@ -1,6 +1,8 @@
 import csv
 import io
+import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import httpx
 import numpy as np
@@ -153,6 +155,36 @@ def strong(returns: object) -> list[dict[str, float]]:
     return sorted(
         (each for each in returns if each["weight"] >= least), key=lambda each: each["time_s"]
     )
+
+
+def test_a_figure_has_the_stems_where_the_returns_are(page: Page, served: Served) -> None:
+    select(page, served)
+    with page.expect_download() as download:
+        choose(page, "response", "Figure (SVG)")
+    figure = ElementTree.fromstring(Path(download.value.path()).read_text())
+    words = [each for each in figure.iterfind(".//{*}text[@text-anchor='middle']") if each.text]
+    below = max(float(each.attrib["y"]) for each in words)
+    marks = {
+        float(str(each.text).split()[0]): float(each.attrib["x"])
+        for each in words
+        if float(each.attrib["y"]) == below
+    }
+    per_px, at_0_ns = np.polyfit([*marks.values()], [*marks], 1)
+    drawn = [each.attrib["d"] for each in figure.iterfind(".//{*}g[@fill='none']/{*}path")]
+    ends = [re.fullmatch(r"M(\S+) \S+L(\S+) \S+", each) for each in drawn]
+    stems_ns = [
+        per_px * float(each[1]) + at_0_ns
+        for each in ends
+        if each is not None and each[1] == each[2]
+    ]
+
+    reported = pixel_of(served)
+    truth = reported["truth"]
+    assert isinstance(truth, dict)
+    for returns in (reported["returns"], truth["returns"]):
+        for each in strong(returns):
+            assert min(abs(1e9 * each["time_s"] - at_ns) for at_ns in stems_ns) < 2 * per_px
+    assert len(stems_ns) >= len(strong(reported["returns"])) + len(strong(truth["returns"]))
 
 
 def test_returns_truth_and_flags_are_listed(page: Page, served: Served) -> None:

@@ -45,8 +45,8 @@ def checks(spec: str) -> Iterator[Reported]:
             level, message, remedy = "fault", f"{clause.promise} But: {broken}", _REPORT
         ended[level] += 1
         yield level, clause.name, message, remedy
-    badge = _BADGE.format(*ended.values(), "red" if ended["fault"] else "green")
-    yield "ok", "for a README", badge, None
+    colour = "red" if ended["fault"] else "yellow" if ended["not tried"] else "green"
+    yield "ok", "for a README", _BADGE.format(*ended.values(), colour), None
 
 
 def _capabilities(spec: str) -> Iterator[Reported]:

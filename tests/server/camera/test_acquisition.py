@@ -246,20 +246,30 @@ def test_stopping_stops_the_camera_and_starting_starts_it_again() -> None:
     assert one.camera.calls == ["start", "stop", "start", "safe_off"]
 
 
-def test_what_is_asked_for_once_it_has_ended_is_refused() -> None:
+def test_what_is_asked_for_once_it_has_ended_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with running() as one:
-        ending = threading.Event()
-        one.camera.safe_off = ending.wait  # type: ignore[method-assign, assignment]
+        reached, ending = threading.Event(), threading.Event()
+
+        def safe_off() -> None:
+            reached.set()
+            ending.wait(PATIENCE_S)
+
+        monkeypatch.setattr(one.camera, "safe_off", safe_off)
         stopping = threading.Thread(target=one.acquisition.stop)
         stopping.start()
-        meanwhile = one.acquisition.occupy("job", lambda camera, go_on: None, offs=0)
+        assert reached.wait(PATIENCE_S)  # no command is run behind that
+        done: list[str] = []
+        meanwhile = one.acquisition.submit(lambda: done.append("meanwhile"))
+        job = one.acquisition.occupy("job", lambda *_: done.append("job"), offs=0)
         ending.set()
         stopping.join()
-        after = one.acquisition.submit(lambda: None)
+        after = one.acquisition.submit(lambda: done.append("after"))
 
-        for refused in (meanwhile, after):
-            with pytest.raises((Problem, JobCancelled)):
+        for refused in (meanwhile, job, after):
+            with pytest.raises(Problem) as caught:
                 refused.result(PATIENCE_S)
+            assert caught.value.kind is kinds.SHUTTING_DOWN
+        assert done == []
 
 
 def test_a_loss_is_noticed_while_nothing_is_read() -> None:
