@@ -51,7 +51,7 @@ def recording(served: Served, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recording") / "light.h5"
     with Camera(served.url, timeout_s=60.0) as camera:
         started = camera.record(frames=2)
-        wait_until(lambda: camera.recording(started["id"])["state"] != "recording")
+        wait_until(lambda: camera.recording(started["id"])["state"] == "complete")
         camera.download_recording(started["id"], path)
     return path
 

@@ -119,7 +119,7 @@ def test_your_own_file_and_recording(tmp_path: Path, served: Served) -> None:
     np.savez(path, moments=moments, base_frequency_hz=20e6)
     with Camera(served.url, timeout_s=60.0) as camera:
         started = camera.record(frames=2)
-        wait_until(lambda: camera.recording(started["id"])["state"] != "recording")
+        wait_until(lambda: camera.recording(started["id"])["state"] == "complete")
         camera.download_recording(started["id"], tmp_path / "own.h5")
         wanted = camera.frame("range", recording=started["id"], number=1).array
 

@@ -12,10 +12,11 @@ from transientcam.discovery import FoundCamera
 from transientcam.errors import ServerUnreachable
 from transientcam_driver import CameraUnreachable, LibusbMissing
 from transientcam_driver.camera import FoundCamera as Camera
+from transientcam_driver.cameras import tofcam660
 from transientcam_driver.cameras.open_usb import _plugin as usb
 from transientcam_driver.cameras.tofcam660 import AnswerType
 from transientcam_driver.cameras.tofcam660._wire import Answer
-from transientcam_simulation.entries import kinect2, tofcam660
+from transientcam_simulation.entries import kinect2
 
 FREE = Camera("usb:A-17", "A-17", "AMCW lidar", "/dev/bus/usb/001/004")
 FORBIDDEN = Camera("usb", node="/dev/bus/usb/001/005", problem="no permission to open it")
