@@ -273,6 +273,8 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
     choose(page, "map", "Close")
     choose(page, "response", "Streak →")
     choose(page, "transient", "Validity ↓")
+    for panel in ("validity", "streak"):  # what draws them is loaded when they are first shown
+        page.locator(f".panel-{panel}").wait_for()
     assert shown() == ["transient", "validity", "sequence", "response", "streak"]
     splitter = page.get_by_role("separator", name="Width of the panels").first
     before = page.locator(".panel-validity").bounding_box()
@@ -292,7 +294,8 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
     assert wider is not None
     assert wider["width"] > narrower["width"]
     page.reload()
-    page.locator(".panel-streak").wait_for()
+    for panel in ("validity", "streak"):
+        page.locator(f".panel-{panel}").wait_for()
     assert shown() == ["transient", "validity", "sequence", "response", "streak"]
     again = page.locator(".panel-validity").bounding_box()
     assert again is not None
@@ -300,4 +303,4 @@ def test_panels_are_moved_added_closed_and_resized_and_stay_so(page: Page, serve
     choose(page, "response", "Show alone")
     assert shown() == ["response"]
     choose(page, "response", "Show all panels")
-    assert len(shown()) == 5
+    expect(page.locator("[data-view]")).to_have_count(5)

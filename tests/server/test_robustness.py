@@ -115,9 +115,9 @@ def test_the_frame_after_a_lost_image_says_so_in_its_meta(
     with streaming(served.stream_url) as client:
         client.subscribe("flags")
         client.frame()
-        fault(http, "corrupt-image")
         lost: list[int] = []
-        while not any(lost):
+        while not any(lost) and len(lost) < 50:
+            fault(http, "corrupt-image")  # again: a busy machine may drop the frame that says so
             lost.append(client.frame().meta["lost_images"])
 
     assert lost[-1] >= 1

@@ -238,8 +238,9 @@ def _command(process: psutil.Process) -> list[str]:
 def _share_time(pid: int) -> None:
     """Give a session the priority of this one, where the kernel shares time between sessions."""
     with suppress(OSError):
-        *_, nice = Path("/proc/self/autogroup").read_text().split()
-        Path(f"/proc/{pid}/autogroup").write_text(nice)
+        shares = Path("/proc/self/autogroup").read_text().split()
+        if shares:  # a container may have the file, and nothing in it
+            Path(f"/proc/{pid}/autogroup").write_text(shares[-1])
 
 
 def _killed(control: Control) -> float:
