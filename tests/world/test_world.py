@@ -4,8 +4,8 @@ import pytest
 
 from tests.world.world import tried_all
 
-SEEDS = 1000
-PARTS = 20
+SEEDS = 500
+PARTS = 10
 
 
 @pytest.mark.parametrize("part", range(PARTS))
