@@ -68,9 +68,8 @@ def by_camera(
                 predicted = predict_takes(camera, sensor, read_s=LOOK_S)
             problem.extensions["takes"] = [asdict(each) for each in predicted]
             raise
-        given = goal.base.to_document()
-        possible = camera.capabilities.sequence_of({name: given[name] for name in goal.fixed})
-        goal = replace(goal, base=possible)
+        fixed = {name: goal.base.to_document()[name] for name in goal.fixed}
+        goal = replace(goal, base=camera.capabilities.sequence_of(fixed))
         planner = Planner(camera.capabilities, sensor, ReconstructionSettings())
         scene = _scene(planner, camera, view, goal, console)
     with tm.kernels.only_note(), console.status("predicting") as status:
