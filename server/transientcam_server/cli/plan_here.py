@@ -1,7 +1,7 @@
 """The verb ``plan`` in this process: a look through a camera, and the search."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -68,6 +68,8 @@ def by_camera(
                 predicted = predict_takes(camera, sensor, read_s=LOOK_S)
             problem.extensions["takes"] = [asdict(each) for each in predicted]
             raise
+        fixed = {name: goal.base.to_document()[name] for name in goal.fixed}
+        goal = replace(goal, base=camera.capabilities.sequence_of(fixed))
         planner = Planner(camera.capabilities, sensor, ReconstructionSettings())
         scene = _scene(planner, camera, view, goal, console)
     with tm.kernels.only_note(), console.status("predicting") as status:

@@ -90,8 +90,7 @@ class FrontCache:
         if self._looks.needs_frame:
             scene = await self._looks.of_frame(frame, None)
         else:
-            frequency_hz = base.base_frequency_hz
-            base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
+            base = Sequence(base_frequency_hz=base.base_frequency_hz, sub_phases=base.sub_phases)
             scene = await self._looks.of_twin(base, None, looking)
         goal = replace(goal, base=base)
         return await self._queue.run(

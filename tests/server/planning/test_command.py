@@ -47,6 +47,20 @@ def test_the_command_prints_a_plan_in_words(capsys: pytest.CaptureFixture[str]) 
     assert any(line.startswith("half the time") for line in words)
 
 
+@pytest.mark.parametrize("fixed", [[], ["base_frequency_hz=14e6"]])
+def test_a_camera_without_sub_phases_is_planned_for_with_what_it_can_do(
+    fixed: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Sub-phases of the default sequence are what an OPT8241 cannot do."""
+    given = {"brightness_dn_per_s": 8e5, "returns": ["1.5"], "fixed": fixed}
+
+    plan_verb.plan(camera="opt8241:emulated", **given, range_error_m=0.05, as_json=True)
+
+    sequence = json.loads(capsys.readouterr().out)["sequence"]
+    assert sequence["sub_phases"] == {"scheme": "none", "n": 1}
+    assert not fixed or sequence["base_frequency_hz"] == pytest.approx(14e6, rel=1e-6)
+
+
 def test_a_given_scene_has_no_region(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(typer.Exit):
         plan_verb.plan(**NEARBY, capture_s=0.1, region="0,0,9,9", as_json=True)

@@ -85,16 +85,15 @@ async def _work(
 
 def _goal(service: Service, request: PlanRequest) -> Goal:
     document = {"base_frequency_hz": service.applied.sequence.base_frequency_hz, **request.fixed}
-    region = Region.of(request.region)
+    region, capabilities = Region.of(request.region), service.camera.capabilities
     if region is not None:
-        capabilities = service.camera.capabilities
         region.mask(capabilities.height, capabilities.width)
     goal = Goal(
         **request.target.model_dump(),
         share=request.share,
         region=region,
         **request.budget.model_dump(),
-        base=Sequence.from_document(document),
+        base=capabilities.sequence_of(document),
         fixed=frozenset(request.fixed),
         estimator=request.estimator,
     )
