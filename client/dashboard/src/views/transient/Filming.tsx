@@ -6,11 +6,10 @@ import { save } from "../../ui/download";
 import type { FilmKind, Progress } from "../../ui/film";
 import { filmFrames, filmPass, type Subject } from "./film";
 
-/** The film that is being made, if one is, and why the last one was not. */
+/** The film that is being made, if one is. */
 export class Filming {
   /** Share that is done, 0 to 1; null while no film is made. */
   readonly share: Signal<number | null> = signal(null);
-  readonly trouble = signal("");
   readonly #cancelled = signal(false);
 
   cancel(): void {
@@ -21,6 +20,7 @@ export class Filming {
   actions(subject: Subject, store: Store): Action[] {
     const run = (make: typeof filmPass, name: string, kind: FilmKind) => (): void => {
       void this.#make(
+        store,
         () => make(subject, store, kind, this.#progress()),
         `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`,
       );
@@ -45,14 +45,14 @@ export class Filming {
     };
   }
 
-  async #make(make: () => Promise<Blob | null>, name: string): Promise<void> {
+  async #make({ events }: Store, make: () => Promise<Blob | null>, name: string): Promise<void> {
     if (this.share.peek() !== null) return; // one film at a time
-    [this.share.value, this.trouble.value, this.#cancelled.value] = [0, "", false];
+    [this.share.value, this.#cancelled.value] = [0, false];
     try {
       const film = await make();
       if (film !== null) save(name, film);
     } catch (error) {
-      this.trouble.value = `No film was made: ${error instanceof Error ? error.message : String(error)}`;
+      events.tell(`No film was made: ${error instanceof Error ? error.message : String(error)}`, "bad");
     } finally {
       this.share.value = null;
     }
@@ -61,14 +61,6 @@ export class Filming {
 
 /** How far the film is; nothing while none is made. */
 export function FilmProgress({ filming }: { filming: Filming }) {
-  if (filming.trouble.value !== "") {
-    return (
-      <div class="panel-row wrapped apart nowrap filming" role="alert">
-        <span>{filming.trouble.value}</span>
-        <Button onClick={() => (filming.trouble.value = "")}>Dismiss</Button>
-      </div>
-    );
-  }
   if (filming.share.value === null) return null;
   return (
     <div class="panel-row wrapped apart nowrap filming" role="status">
