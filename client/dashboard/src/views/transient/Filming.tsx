@@ -7,10 +7,18 @@ import type { FilmKind, Progress } from "../../ui/film";
 import { filmFrames, filmPass, type Subject } from "./film";
 
 /** The film that is being made, if one is. */
-export class Filming {
+export class Filming implements Progress {
   /** Share that is done, 0 to 1; null while no film is made. */
   readonly share: Signal<number | null> = signal(null);
   readonly #cancelled = signal(false);
+
+  get cancelled(): boolean {
+    return this.#cancelled.value;
+  }
+
+  report(share: number): void {
+    this.share.value = share;
+  }
 
   cancel(): void {
     this.#cancelled.value = true;
@@ -21,7 +29,7 @@ export class Filming {
     const run = (make: typeof filmPass, name: string, kind: FilmKind) => (): void => {
       void this.#make(
         store,
-        () => make(subject, store, kind, this.#progress()),
+        () => make(subject, store, kind, this),
         `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`,
       );
     };
@@ -33,16 +41,6 @@ export class Filming {
       { text: `Film of one pass (${text})`, run: run(filmPass, "pass", kind) },
       { text: `Film of 30 frames (${text})`, run: run(filmFrames, "frames", kind) },
     ]);
-  }
-
-  #progress(): Progress {
-    const cancelled = this.#cancelled;
-    return {
-      get cancelled() {
-        return cancelled.value;
-      },
-      report: (share) => (this.share.value = share),
-    };
   }
 
   async #make({ events }: Store, make: () => Promise<Blob | null>, name: string): Promise<void> {
