@@ -4,7 +4,7 @@ import type { Action } from "../../ui/ActionMenu";
 import { Button } from "../../ui/controls";
 import { save } from "../../ui/download";
 import type { FilmKind, Progress } from "../../ui/film";
-import { filmFrames, filmPass, type Subject } from "./film";
+import { filmPass, type Subject } from "./film";
 
 /** The film that is being made, if one is. */
 export class Filming implements Progress {
@@ -26,21 +26,14 @@ export class Filming implements Progress {
 
   /** Films to choose from. */
   actions(subject: Subject, store: Store): Action[] {
-    const run = (make: typeof filmPass, name: string, kind: FilmKind) => (): void => {
-      void this.#make(
-        store,
-        () => make(subject, store, kind, this),
-        `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`,
-      );
+    const run = (kind: FilmKind) => (): void => {
+      const name = `pass-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`;
+      void this.#make(store, () => filmPass(subject, store, kind, this), name);
     };
-    const kinds: readonly (readonly [FilmKind, string])[] = [
-      ["webm", "WebM"],
-      ["gif", "GIF"],
+    return [
+      { text: "Film of one pass (WebM)", run: run("webm") },
+      { text: "Film of one pass (GIF)", run: run("gif") },
     ];
-    return kinds.flatMap(([kind, text]) => [
-      { text: `Film of one pass (${text})`, run: run(filmPass, "pass", kind) },
-      { text: `Film of 30 frames (${text})`, run: run(filmFrames, "frames", kind) },
-    ]);
   }
 
   async #make({ events }: Store, make: () => Promise<Blob | null>, name: string): Promise<void> {
