@@ -1,8 +1,9 @@
 import { effect } from "@preact/signals";
+import type { ComponentType } from "preact";
 import { useEffect } from "preact/hooks";
 
-import { useStore } from "./store/store";
-import { SwitchedDialog } from "./ui/Dialog";
+import { type DialogName, useStore } from "./store/store";
+import { Dialog, type Done } from "./ui/Dialog";
 import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
@@ -19,9 +20,20 @@ import { TokenDialog } from "./views/status/TokenDialog";
 
 const Examples = later(() => import("./views/examples/Examples"));
 
+const DIALOGS: readonly (readonly [name: DialogName, title: string, inside: ComponentType<Done>])[] = [
+  ["help", "Keys", Help],
+  ["examples", "Examples", Examples],
+  ["palette", "All commands", Palette],
+  ["layout", "Layouts", LayoutDialog],
+  ["control", "Control", ControlDialog],
+  ["camera", "Camera", CameraDialog],
+  ["token", "Authentication required", TokenDialog],
+];
+
 /** The page: how things stand, what is wrong, and the views. */
 export function App({ onRetry }: { onRetry: () => void }) {
   const store = useStore();
+  const close = (): void => void (store.dialog.value = null);
   useEffect(() => shortcuts(window, store), [store]);
   useEffect(
     () =>
@@ -36,13 +48,11 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <Banner onRetry={onRetry} />
       <Arrangement />
       <ReplayBar />
-      <SwitchedDialog open={store.help} title="Keys" inside={Help} />
-      <SwitchedDialog open={store.examples} title="Examples" inside={Examples} />
-      <SwitchedDialog open={store.palette} title="All commands" inside={Palette} />
-      <SwitchedDialog open={store.asksForLayout} title="Layouts" inside={LayoutDialog} />
-      <SwitchedDialog open={store.asksForControl} title="Control" inside={ControlDialog} />
-      <SwitchedDialog open={store.asksForCamera} title="Camera" inside={CameraDialog} />
-      <SwitchedDialog open={store.asksForToken} title="Authentication required" inside={TokenDialog} />
+      {DIALOGS.map(([name, title, Inside]) => (
+        <Dialog key={name} open={store.dialog.value === name} title={title} onClose={close}>
+          <Inside onDone={close} />
+        </Dialog>
+      ))}
       <FileDrop />
     </>
   );

@@ -279,7 +279,7 @@ describe("between worker and store", () => {
     page.receives({ type: "message", message: { type: "error", problem } }, { type: "refused" });
     expect(page.store.status.unreadable.value).toBeNull();
     expect(page.store.status.connection.value).toEqual({ kind: "refused" });
-    expect(page.store.asksForToken.value).toBe(true);
+    expect(page.store.dialog.value).toBe("token");
     page.store.api.credentials.use("tc_secret");
     expect(page.sent.at(-1)).toEqual({ type: "authenticate", token: "tc_secret" });
   });

@@ -36,6 +36,21 @@ describe("a figure", () => {
     expect(svg).toContain('<stop offset="1" stop-color="rgb(253,231,37)"/>');
   });
 
+  test("marks times downwards from the first edge to the last", () => {
+    const timed = figureSvg({ ...FIGURE, sides: 40 }, layout);
+    const found = marks(timed);
+    expect(found.get("0")).toBeDefined();
+    expect(found.get("30")?.[1]).toBeCloseTo(layout.top + 0.75 * 480, 9);
+    expect(timed).toContain(">time of flight (ns)<");
+  });
+
+  test("has neither rows nor columns of a view in space, and no bar of colours that stand for nothing", () => {
+    const space = figureSvg({ ...FIGURE, sides: "space", scale: null }, layout);
+    expect(marks(space).size).toBe(0);
+    expect(space).not.toContain("(pixels)");
+    expect(space).not.toContain("<linearGradient");
+  });
+
   test("has its words as text, whatever stands in them", () => {
     expect(svg).toContain("Range &amp; &lt;b>");
     expect(svg).toContain(">m = 3<");

@@ -28,7 +28,7 @@ test("keys move the light, its speed, the map, the layout and the colours", () =
   press(store, "t");
   expect(store.theme.choice.value).toBe("light");
   press(store, "?");
-  expect(store.help.value).toBe(true);
+  expect(store.dialog.value).toBe("help");
 });
 
 test("layouts follow each other in a circle, whichever is on screen", () => {

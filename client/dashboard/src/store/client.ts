@@ -107,7 +107,7 @@ export class StreamClient {
     refused: () => {
       this.store.status.connection.value = { kind: "refused" };
       this.store.caller.forget();
-      this.store.asksForToken.value = true;
+      this.store.dialog.value = "token";
     },
     waiting: ({ reason, retry_s }) => this.store.status.connectionLost(reason, this.now_s() + retry_s),
     camera: ({ document }) => this.#takeCamera(document),

@@ -1,4 +1,4 @@
-import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
+import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
 import type { Tone, ToneKind } from "../scales/tone";
 import { TONES } from "../scales/tone";
@@ -39,6 +39,8 @@ export class TransientLook {
   readonly play: Signal<Play>;
   /** Draws the picture anew and answers its canvas, which can be read in this task. */
   snapshot: () => HTMLCanvasElement | null = () => null;
+  /** Stills and films that can be made of it: none while it is not on screen. */
+  readonly files = signal<readonly Readonly<{ text: string; run: () => void }>[]>([]);
   readonly white: ReadonlySignal<number>;
   #metered: number | null = null;
 

@@ -48,6 +48,9 @@ class Ground {
 const isMap = (value: unknown): value is string => typeof value === "string" && /^[a-z][\w-]{0,62}$/.test(value);
 const A_MAP: Kind<string> = { accepts: isMap, text: String, parse: (text) => (isMap(text) ? text : undefined) };
 
+/** What may be open over the page; one at a time. */
+export type DialogName = "help" | "examples" | "palette" | "layout" | "control" | "camera" | "token";
+
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
 export class Store extends Ground {
   readonly frames = new Frames();
@@ -90,20 +93,8 @@ export class Store extends Ground {
   readonly noises = new Noises(this.frames);
   /** The pixel under the pointer, in whichever view. */
   readonly pointed = signal<Pixel | null>(null);
-  /** Whether the list of keys is open. */
-  readonly help = signal(false);
-  /** Whether the examples are shown. */
-  readonly examples = signal(false);
-  /** Whether it is asked who controls the camera. */
-  readonly asksForControl = signal(false);
-  /** Whether a token is asked for. */
-  readonly asksForToken = signal(false);
-  /** Whether a camera is asked for: also where the service has none. */
-  readonly asksForCamera = signal(false);
-  /** Whether the list of all commands is open. */
-  readonly palette = signal(false);
-  /** Whether a name for the layout is asked for. */
-  readonly asksForLayout = signal(false);
+  /** What is open over the page, to be read or answered. */
+  readonly dialog = signal<DialogName | null>(null);
 
   // Links say these in this order.
 
@@ -150,10 +141,13 @@ export class Store extends Ground {
       this.lease.refused(kindOf(problem));
       if (problem.status !== 401) return;
       this.caller.forget();
-      this.asksForToken.value = true;
+      this.dialog.value = "token";
     };
     const absent = computed(() => this.camera.value?.capabilities.model === "none");
-    effect(() => void (this.asksForCamera.value = absent.value));
+    effect(() => {
+      if (absent.value) this.dialog.value = "camera";
+      else if (this.dialog.peek() === "camera") this.dialog.value = null;
+    });
     effect(() => {
       const seesLight = this.frames.absent.value.coefficients === undefined;
       if (!seesLight && JSON.stringify(this.layout.peek()) === JSON.stringify(OVERVIEW)) this.layout.value = SPACE;

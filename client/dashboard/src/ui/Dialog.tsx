@@ -1,5 +1,4 @@
-import type { Signal } from "@preact/signals";
-import type { ComponentChildren, ComponentType } from "preact";
+import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { LightOffButton } from "./LightOffButton";
 import "./Dialog.css";
@@ -51,21 +50,5 @@ export function Dialog({ open, title, onClose, children }: DialogProps) {
   );
 }
 
-interface SwitchedDialogProps {
-  readonly open: Signal<boolean>;
-  readonly title: string;
-  /** What stands in it, and closes it when it is done. */
-  readonly inside: ComponentType<Done>;
-}
-
+/** What is told to what stands in a dialog: how to close it. */
 export type Done = Readonly<{ onDone: () => void }>;
-
-/** A dialog that is open while a signal says so. */
-export function SwitchedDialog({ open, title, inside: Inside }: SwitchedDialogProps) {
-  const close = (): void => void (open.value = false);
-  return (
-    <Dialog open={open.value} title={title} onClose={close}>
-      <Inside onDone={close} />
-    </Dialog>
-  );
-}

@@ -12,5 +12,5 @@ export function FirstFrame() {
     if (status.running.value === false) return "The camera stands still: Start or Single takes a frame.";
     return "Waiting for the first frame";
   });
-  return <p class="stage-empty">{words}</p>;
+  return <p class="stage-empty cover">{words}</p>;
 }

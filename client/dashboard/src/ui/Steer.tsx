@@ -18,13 +18,13 @@ export function Steer({ title, disabled = false, ...button }: ButtonProps) {
 
 /** Why nothing can be changed here, beside controls that are disabled for it. */
 export function Obstacle() {
-  const { caller, obstacle, asksForControl, asksForToken } = useStore();
+  const { caller, obstacle, dialog } = useStore();
   if (obstacle.value === null) return null;
-  const [way, asks] = caller.obstacle.value === null ? ["Take control…", asksForControl] : ["Token…", asksForToken];
+  const [way, asks] = caller.obstacle.value === null ? ["Take control…", "control" as const] : ["Token…", "token" as const];
   return (
     <p class="obstacle" role="status">
       {obstacle.value}: you can look, but not change this.{" "}
-      <Button class="link" onClick={() => (asks.value = true)}>
+      <Button class="link" onClick={() => (dialog.value = asks)}>
         {way}
       </Button>
     </p>

@@ -6,16 +6,16 @@ import { saveDrawing } from "./figureFiles";
 /** What is written around a plot, and the name of its file. */
 export type PlotWords = Readonly<{ name: string; title: string; caption: string }>;
 
-/** Hands a plot out. */
-export function savePlot(plot: uPlot, { name, title, caption }: PlotWords, kind: "png" | "svg"): void {
-  const { width, height } = plot.root.getBoundingClientRect();
-  const style = getComputedStyle(plot.root.closest(".panel") ?? plot.root);
+/** Hands a plot out: one of uPlot, or an SVG of the page. */
+export function savePlot(root: Element, plot: uPlot | undefined, { name, title, caption }: PlotWords, kind: "png" | "svg"): void {
+  const { width, height } = root.getBoundingClientRect();
+  const style = getComputedStyle(root.closest(".panel") ?? root);
   const size = { width: Math.ceil(Math.max(width, LETTER_PX * caption.length) + 2 * EDGE), height: Math.ceil(height + HEAD + FOOT) };
   const svg = [
     `<svg xmlns="http://www.w3.org/2000/svg" width="${size.width}" height="${size.height}" viewBox="0 0 ${size.width} ${size.height}" font-family="Inter, Helvetica, Arial, sans-serif" font-size="12" fill="${style.color}">`,
     `<rect width="100%" height="100%" fill="${style.backgroundColor}"/>`,
     text(EDGE, HEAD - 14, title, 'font-size="14" font-weight="600"'),
-    `<g transform="translate(${EDGE} ${HEAD})">${plotSvg(plot)}</g>`,
+    `<g transform="translate(${EDGE} ${HEAD})">${plot === undefined ? styledSvg(root) : plotSvg(plot)}</g>`,
     text(EDGE, size.height - 10, caption, 'font-size="11"'),
     "</svg>",
   ];
@@ -25,6 +25,22 @@ export function savePlot(plot: uPlot, { name, title, caption }: PlotWords, kind:
 const [EDGE, HEAD, FOOT] = [12, 34, 52];
 /** Room of a letter of the caption, and of the name of a line. */
 const [LETTER_PX, NAME_PX] = [6, 90];
+
+/** What the style sheets of the page say of shapes and words. */
+const STYLES = ["fill", "stroke", "stroke-width", "stroke-dasharray", "vector-effect", "opacity", "font-size", "font-weight"];
+
+/** An SVG of the page, which keeps its looks without the style sheets. */
+function styledSvg(root: Element): string {
+  const copy = root.cloneNode(true) as Element;
+  const [shown, kept] = [root, copy].map((each) => [...each.querySelectorAll("*")]);
+  shown.forEach((element, n) => {
+    const style = getComputedStyle(element);
+    for (const name of STYLES) kept[n].setAttribute(name, style.getPropertyValue(name));
+  });
+  const { width, height } = root.getBoundingClientRect();
+  for (const [name, px] of Object.entries({ width, height })) copy.setAttribute(name, String(px));
+  return new XMLSerializer().serializeToString(copy);
+}
 
 /** What uPlot knows of an axis once it has drawn it. */
 type DrawnAxis = uPlot.Axis & { readonly _splits?: readonly number[]; readonly _values?: readonly (string | null)[] };

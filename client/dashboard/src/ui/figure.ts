@@ -5,7 +5,8 @@ import { engineering, fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, niceStep, type Scale, ticks } from "../scales/scale";
 import { multiplesWords } from "../store/events";
 import { sentWords } from "../store/frames";
-import type { AppliedDocument, FrameMeta } from "../stream/documents";
+import type { AppliedDocument, FrameDocument, FrameMeta } from "../stream/documents";
+import type { Action } from "./ActionMenu";
 
 export interface Figure {
   /** The picture as an address that stands in the file; null leaves its place empty. */
@@ -15,28 +16,24 @@ export interface Figure {
   readonly rows: number;
   readonly title: string;
   readonly caption: string;
-  readonly scale: Scale;
+  /** Of the colour bar; null where colours stand for no number. */
+  readonly scale: Scale | null;
   readonly colours: ColourMapName;
   readonly unit: string;
   readonly ground: "black" | "white";
+  /** What its sides are where they are not rows and columns: a time from 0 to this in ns downwards, or nothing, of a view in space. */
+  readonly sides?: number | "space";
 }
 
 /** Sizes in px of the figure, and the place of the picture in it. */
-export interface FigureLayout {
-  readonly width: number;
-  readonly height: number;
-  readonly left: number;
-  readonly top: number;
-  readonly pictureWidth: number;
-  readonly pictureHeight: number;
-}
+type FigureLayout = ReturnType<typeof figureLayout>;
 
 const MARGINS = { left: 46, top: 30, right: 92, bottom: 66 } as const;
 const BAR_PX = 14;
 const TICK_PX = 4;
 
 /** A picture of whole times its pixels, about `wide` px wide, with margins. */
-export function figureLayout(columns: number, rows: number, wide: number): FigureLayout {
+export function figureLayout(columns: number, rows: number, wide: number) {
   const zoom = Math.max(1, Math.round(wide / columns));
   const [pictureWidth, pictureHeight] = [columns * zoom, rows * zoom];
   const { left, top, right, bottom } = MARGINS;
@@ -44,18 +41,19 @@ export function figureLayout(columns: number, rows: number, wide: number): Figur
 }
 
 /** What was measured with, in a line, and which pixels were. */
-export function captionOf(meta: FrameMeta, applied: AppliedDocument | null): string {
+export function captionOf(meta: FrameMeta | FrameDocument, applied: AppliedDocument | null): string {
   const { harmonics, base_frequency_hz, zeroth, exposure_s, takes, calibration_id, estimator, frame } = meta;
   const measured = multiplesWords(harmonics, applied?.sequence_id === meta.sequence_id ? applied?.sampling : null);
   const sequence = `${measured}, ${engineering(base_frequency_hz, "Hz", 4)}, b₀ ${zeroth.replaceAll("_", " ")}, ${engineering(exposure_s, "s")} × ${takes}`;
-  const sent = sentWords(meta);
+  const sent = "decimation" in meta ? sentWords(meta) : "";
   return `${sequence}; ${estimator}; calibration ${calibration_id || "none"}; frame ${frame}${sent && `, ${sent}`}`;
 }
 
 export function figureSvg(figure: Figure, layout: FigureLayout): string {
   const { width, height, left, top, pictureWidth, pictureHeight } = layout;
+  const { sides, scale } = figure;
   const ink = figure.ground === "black" ? "#e4e9ee" : "#1a2129";
-  const [right, foot] = [left + pictureWidth, top + pictureHeight];
+  const right = left + pictureWidth;
   const picture =
     figure.picture === null
       ? ""
@@ -66,15 +64,27 @@ export function figureSvg(figure: Figure, layout: FigureLayout): string {
     text(left, top - 11, figure.title, 'font-size="14" font-weight="600"'),
     picture,
     `<rect x="${left - 0.5}" y="${top - 0.5}" width="${pictureWidth + 1}" height="${pictureHeight + 1}" fill="none" stroke="${ink}"/>`,
-    ...axis(figure.columns, 8).map(({ pixel, share }) => mark(left + share * pictureWidth, foot, "down", String(pixel), ink)),
-    ...axis(figure.rows, 6).map(({ pixel, share }) => mark(left, top + share * pictureHeight, "left", String(pixel), ink)),
-    text(left + pictureWidth / 2, foot + 32, "column (pixels)", 'text-anchor="middle"'),
-    `<text transform="translate(12 ${top + pictureHeight / 2}) rotate(-90)" text-anchor="middle">row (pixels)</text>`,
-    bar(figure, right + 12, top, pictureHeight, ink),
+    ...(sides === "space" ? [] : axes(figure, layout, sides, ink)),
+    scale === null ? "" : bar({ ...figure, scale }, right + 12, top, pictureHeight, ink),
     text(left, height - 12, figure.caption, 'font-size="11"'),
     "</svg>",
   ];
   return parts.join("\n");
+}
+
+/** Both sides with round numbers and what they count. */
+function axes({ columns, rows }: Figure, layout: FigureLayout, end_ns: number | undefined, ink: string): string[] {
+  const { left, top, pictureWidth, pictureHeight } = layout;
+  const foot = top + pictureHeight;
+  const times = end_ns === undefined ? [] : ticks({ low: 0, high: end_ns, kind: "linear" }, 8);
+  const down = end_ns === undefined ? axis(rows, 6) : times.map((time_ns) => ({ pixel: time_ns, share: time_ns / end_ns }));
+  const name = end_ns === undefined ? "row (pixels)" : "time of flight (ns)";
+  return [
+    ...axis(columns, 8).map(({ pixel, share }) => mark(left + share * pictureWidth, foot, "down", String(pixel), ink)),
+    ...down.map(({ pixel, share }) => mark(left, top + share * pictureHeight, "left", String(pixel), ink)),
+    text(left + pictureWidth / 2, foot + 32, "column (pixels)", 'text-anchor="middle"'),
+    `<text transform="translate(12 ${top + pictureHeight / 2}) rotate(-90)" text-anchor="middle">${name}</text>`,
+  ];
 }
 
 /** Round pixels along an axis, each marked at its middle. */
@@ -84,7 +94,7 @@ function axis(pixels: number, count: number): { readonly pixel: number; readonly
     .map((pixel) => ({ pixel, share: (pixel + 0.5) / pixels }));
 }
 
-function bar({ scale, colours, unit }: Figure, x: number, top: number, height: number, ink: string): string {
+function bar({ scale, colours, unit }: Figure & { readonly scale: Scale }, x: number, top: number, height: number, ink: string): string {
   const table = colourTable(colours);
   const stops = Array.from({ length: 33 }, (_, n) => {
     const level = 4 * Math.min(LEVELS - 1, levelOf(n / 32));
@@ -115,4 +125,12 @@ export function text(x: number, y: number, words: string, attributes = ""): stri
 /** A time of flight and the range it stands for, for titles. */
 export function timeWords(time_s: number, range_m: number): string {
   return `${withUnit((time_s * 1e9).toFixed(2), "ns")} (${withUnit(range_m.toFixed(2), "m")})`;
+}
+
+/** A figure in both of its kinds. */
+export function figures(run: (kind: "png" | "svg") => () => void): Action[] {
+  return [
+    { text: "Figure (PNG)", run: run("png") },
+    { text: "Figure (SVG)", run: run("svg") },
+  ];
 }

@@ -1,7 +1,7 @@
 /** Figures as files and as pictures: what needs a browser. */
 import type { Action } from "./ActionMenu";
 import { save, savePicture } from "./download";
-import { type Figure, figureLayout, figureSvg } from "./figure";
+import { type Figure, figureLayout, figureSvg, figures } from "./figure";
 
 /** Width of a figure's picture, in px; a PNG has `PNG_SCALE` times as many. */
 const FIGURE_PX = 640;
@@ -56,11 +56,7 @@ export function pictureFiles(name: () => string, canvas: () => HTMLCanvasElement
     const words = parts();
     if (words !== null) void saveFigure(name(), canvas(), words, kind);
   };
-  return [
-    { text: "Picture (PNG)", run: () => savePicture(name(), canvas()) },
-    { text: "Figure (PNG)", run: figure("png") },
-    { text: "Figure (SVG)", run: figure("svg") },
-  ];
+  return [{ text: "Picture (PNG)", run: () => savePicture(name(), canvas()) }, ...figures(figure)];
 }
 
 /** An SVG as an image that can be drawn. */

@@ -75,9 +75,9 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { keys: ["v"], shown: "V", words: "blink: the other of the compared frames", run: ({ comparison }) => comparison.blink() },
   { keys: ["l"], shown: "L", words: "the next layout", run: (store) => nextLayout(store) },
   { keys: ["z"], shown: "Z", words: "undo the last change of the layout", withControl: true, run: ({ layouts }) => layouts.undo() },
-  { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ palette }) => (palette.value = true) },
+  { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ dialog }) => (dialog.value = "palette") },
   { keys: ["t"], shown: "T", words: "light, dark, or as the system", run: ({ theme }) => theme.next() },
-  { keys: ["?"], shown: "?", words: "this list", run: ({ help }) => (help.value = !help.peek()) },
+  { keys: ["?"], shown: "?", words: "this list", run: ({ dialog }) => (dialog.value = dialog.peek() === "help" ? null : "help") },
 ];
 
 function nextLayout(store: Store): void {

@@ -17,7 +17,7 @@ export function Examples() {
     if (moves && !(await task.run("Preparing the scene…", () => simulation.set({ scene })))) return;
     [store.alone.value, store.selected.value] = [null, null];
     settings.follow(state);
-    store.examples.value = false;
+    store.dialog.value = null;
   };
   return (
     <div class="control column">

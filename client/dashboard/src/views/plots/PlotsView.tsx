@@ -79,7 +79,7 @@ function AlongLine({ look, data }: { look: Look; data: Signal<uPlot.AlignedData>
   }, [look, ends]);
   const { name, unit } = look.product;
   if (ends.value.includes(undefined))
-    return <p class="stage-empty">Pin two pixels, A and B, with Shift and a click: their line is shown here.</p>;
+    return <p class="stage-empty cover">Pin two pixels, A and B, with Shift and a click: their line is shown here.</p>;
   return (
     <LineChart
       label={`${name} along the line from A to B`}

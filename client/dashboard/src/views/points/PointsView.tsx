@@ -2,23 +2,24 @@ import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import { LightPainter } from "../../gl/paintLight";
 import { fixed, grouped, numberOf } from "../../scales/format";
-import { LIVE, refusalIn } from "../../store/api";
+import { LIVE } from "../../store/api";
 import type { Frame } from "../../store/frames";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
 import { MapBar } from "../../ui/ColourBar";
 import { Button, Choice, Toggle } from "../../ui/controls";
-import { download, save, savePicture } from "../../ui/download";
+import { download, saveTable } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
+import { captionOf } from "../../ui/figure";
+import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { PinsRow } from "../map/PinsRow";
-import { backdropOf, LightBar } from "../transient/LightBar";
-import { byFlags, byPicture, byValue, colourCloud, fieldOfView, fillCloud, type Painter } from "./cloud";
+import { backdropOf, LightBar, lightScale } from "../transient/LightBar";
+import { byFlags, byPicture, byValue, colourCloud, fieldOfView, fillCloud, type Painter, pointRows } from "./cloud";
 import { FIELD_DEG, FIELDS_DEG, knownLens, lensOf } from "./lens";
-import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 import { SceneStage } from "./SceneStage";
 import "../../ui/Ticks.css";
@@ -132,20 +133,30 @@ export function PointsView() {
   const saveShown = (): void => {
     const [frame, drawn] = [range.peek(), scene.peek()];
     if (frame === null || drawn === null) return;
-    const [height, width] = frame.shape;
-    const intrinsics = { width, height, source: knownLens(store)?.source ?? "assumed", ...lensOf(store, width, height) };
-    const facts = { frame: frame.meta.frame, intrinsics };
-    save(`points-${frame.meta.frame}.ply`, new Blob([plyOf(drawn.cloudFor(width * height), count.peek(), facts)]));
+    const light = store.frames.of(ofLight).peek();
+    const values = { range_m: frame.values, ...(light?.meta.frame === frame.meta.frame ? { [`${ofLight}_dn`]: light.values } : {}) };
+    saveTable(`points-${frame.meta.frame}`, pointRows(drawn.cloudFor(frame.values.length), count.peek(), frame.shape[1], values));
+  };
+  const parts = (): FigureParts | null => {
+    const [frame, chosen] = [range.peek(), colouring.peek()];
+    if (frame === null) return null;
+    const look = chosen === "light" ? lightLook : rangeLook;
+    const bar = { scale: chosen === "validity" ? null : look.scale.peek(), colours: look.colours.peek(), unit: look.product.unit };
+    const flight = chosen === "flight" ? { ...lightScale(light, store, "density"), colours: light.colours.peek() } : {};
+    const title = `Points in space, coloured by ${chosen === "light" ? ofLight : NAMES[chosen]}`;
+    return { title, caption: captionOf(frame.meta, store.sequence.peek()), ground: "black", sides: "space", ...bar, ...flight };
+  };
+  /** Drawn anew, as it can be read in the task that drew it alone. */
+  const snapshot = (): HTMLCanvasElement | null => {
+    scene.peek()?.drawNow();
+    return canvas.current;
   };
   const saveAll = async (): Promise<void> => {
     const frame = range.peek();
     if (frame === null) return;
     const place = frame.origin === LIVE ? `/frames/${frame.meta.frame}` : frame.origin;
-    try {
-      await download(store.api, frameUrl(place, "pointcloud.ply"), `pointcloud-${frame.meta.frame}.ply`);
-    } catch (error) {
-      store.status.unreadable.value = refusalIn(error).message;
-    }
+    const file = `pointcloud-${frame.meta.frame}.ply`;
+    await store.events.reported(() => download(store.api, frameUrl(place, "pointcloud.ply"), file));
   };
 
   const frameless = useComputed(() => range.value === null);
@@ -161,14 +172,8 @@ export function PointsView() {
         </PopoverButton>
       }
       downloads={[
-        {
-          text: "Picture (PNG)",
-          run: () => {
-            scene.peek()?.drawNow();
-            savePicture(`points-${range.peek()?.meta.frame ?? 0}`, canvas.current);
-          },
-        },
-        { text: "Points as shown (PLY)", run: saveShown },
+        ...pictureFiles(() => `points-${range.peek()?.meta.frame ?? 0}`, snapshot, parts),
+        { text: "Points as shown (CSV)", run: saveShown },
         { text: "Points with light and flags (PLY)", run: () => void saveAll() },
       ]}
     >
@@ -176,11 +181,11 @@ export function PointsView() {
         <div class="points grow" ref={box}>
           <SceneStage canvas={canvas} scene={scene} range={range} />
           {trouble.value !== null ? (
-            <p class="stage-empty">{trouble.value}</p>
+            <p class="stage-empty cover">{trouble.value}</p>
           ) : frameless.value ? (
             <FirstFrame />
           ) : (
-            loading.value && <p class="stage-empty">Loading</p>
+            loading.value && <p class="stage-empty cover">Loading</p>
           )}
         </div>
         {colouring.value === "flight" ? (

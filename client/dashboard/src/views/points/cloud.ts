@@ -1,6 +1,7 @@
 /** A range map as points in space: written into the arrays of a geometry, nothing allocated a frame. */
 import { type ColourMapName, rgbaOf } from "../../scales/colourMaps";
 import type { Scale } from "../../scales/scale";
+import type { Rows } from "../../ui/download";
 import { gravest } from "../../ui/flags";
 import { picker } from "../../ui/paint";
 import { alongRay, type Lens, type Pinhole, raysOf } from "./rays";
@@ -48,6 +49,20 @@ export function fillCloud(cloud: Cloud, range_m: ArrayLike<number>, width: numbe
     at += 3;
   }
   return at / 3;
+}
+
+/** The first `count` points as a table, in the camera's own axes, x right, y down, z ahead, with other values of their pixels by name. */
+export function pointRows(
+  { positions, pixels }: Cloud,
+  count: number,
+  width: number,
+  values: Readonly<Record<string, ArrayLike<number>>>,
+): Rows {
+  const places = Array.from({ length: count }, (_, n) => {
+    const [x_m, up_m, back_m] = positions.subarray(3 * n, 3 * n + 3);
+    return [pixels[n] % width, Math.floor(pixels[n] / width), x_m, -up_m, -back_m, ...Object.values(values).map((of) => of[pixels[n]])];
+  });
+  return [["column_px", "row_px", "x_m", "y_m", "z_m", ...Object.keys(values)], ...places];
 }
 
 /** Colours the first `count` points. */

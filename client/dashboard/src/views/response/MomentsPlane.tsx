@@ -9,7 +9,7 @@ const REACH = 1.25;
 
 /** The moments over b_0 on the complex plane: no light can put them outside of the unit circle. */
 export function MomentsPlane({ pixel }: { pixel: ReadonlySignal<Pixel | null> }) {
-  if (pixel.value === null) return <p class="stage-empty">This pixel has no density.</p>;
+  if (pixel.value === null) return <p class="stage-empty cover">This pixel has no density.</p>;
   const { moments } = pixel.value;
   const points = Array.from({ length: moments.length / 2 - 1 }, (_, at) => {
     const [re, im] = [moments[2 * at + 2] / moments[0], moments[2 * at + 3] / moments[0]];
@@ -18,7 +18,7 @@ export function MomentsPlane({ pixel }: { pixel: ReadonlySignal<Pixel | null> })
   return (
     <div class="moments grow">
       <svg
-        class="moments-plane"
+        class="plot moments-plane"
         viewBox={`${-REACH} ${-REACH} ${2 * REACH} ${2 * REACH}`}
         role="img"
         aria-label="Moments over b₀ on the complex plane"

@@ -85,7 +85,7 @@ export function ResponseView() {
     <Panel
       name="response"
       downloads={shown.value === null ? [] : files}
-      plot={shown.value === null || side.value === "moments" ? undefined : words}
+      plot={shown.value === null ? undefined : words}
       title={
         <h2>
           Impulse response <span class="quiet">{place.value === null ? "" : `of pixel ${place.value}`}</span>
@@ -99,7 +99,7 @@ export function ResponseView() {
       }
     >
       <div class="response grow spaced">
-        {frameless.value ? <FirstFrame /> : place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
+        {frameless.value ? <FirstFrame /> : place.value === null && <p class="stage-empty cover">Click a pixel in one of the pictures.</p>}
         {place.value === null ? null : obstacle !== undefined ? (
           <p class="absent" data-field="absent">
             This camera has no density of light over time: {obstacle}.

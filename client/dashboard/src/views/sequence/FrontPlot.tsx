@@ -47,7 +47,7 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
     <div class="front" ref={box}>
       {width > 0 && inner.height > 0 && (
         <svg
-          class="cover"
+          class="plot cover"
           width={width}
           height={height}
           role="group"

@@ -1,8 +1,10 @@
 import { useSignal } from "@preact/signals";
 import type { Accuracy } from "../../store/accuracy";
 import { useStore } from "../../store/store";
+import type { FrameDocument } from "../../stream/documents";
 import { Button } from "../../ui/controls";
 import { saveTable } from "../../ui/download";
+import { captionOf } from "../../ui/figure";
 import { Panel } from "../../ui/Panel";
 import { Steer } from "../../ui/Steer";
 import { AccuracySection } from "./AccuracySection";
@@ -13,11 +15,18 @@ export function SequenceView() {
   const { sequence, sequencing, accuracy } = useStore();
   const editing = useSignal(false);
   const applied = sequence.value;
+  const found = accuracy.tradeoff.value;
+  const words = (meta: FrameDocument) => ({
+    name: "front",
+    title: "Error of the range against time of a capture",
+    caption: captionOf(meta, applied),
+  });
   return (
     <Panel
       name="sequence"
       title={<h2>Sequence and accuracy</h2>}
-      downloads={accuracy.tradeoff.value === null ? [] : [{ text: "Front (CSV)", run: () => saveTable("front", frontTable(accuracy)) }]}
+      plot={found === null || editing.value ? undefined : () => words(found.current.meta)}
+      downloads={found === null ? [] : [{ text: "Front (CSV)", run: () => saveTable("front", frontTable(accuracy)) }]}
       tools={
         applied !== null &&
         !editing.value && (
@@ -42,7 +51,7 @@ export function SequenceView() {
       }
     >
       {applied === null ? (
-        <p class="stage-empty">Not known yet</p>
+        <p class="stage-empty cover">Not known yet</p>
       ) : editing.value ? (
         <SequenceEditor applied={applied} onDone={() => (editing.value = false)} />
       ) : (

@@ -26,11 +26,15 @@ const COLUMNS: readonly (readonly [string, (row: SeriesRow) => string])[] = [
 
 /** Frames at each of several settings, and how far their ranges scatter and are off. */
 export function SeriesView() {
-  const { series, sequence, measures } = useStore();
+  const { series, sequence, measures, reconstruction } = useStore();
   const task = useTask();
   const harmonics = useSignal("3, 4");
   const exposures_us = useSignal("");
   const takes = useSignal("");
+  const estimators = useSignal("");
+  const neighbours = useSignal("");
+  useEffect(() => void reconstruction.refresh(), [reconstruction]);
+  const now = reconstruction.document.value?.document;
   const frames = useSignal("100");
   const target_mm = useSignal("10");
   useEffect(() => void series.show(), [series, series.id.value]);
@@ -39,11 +43,15 @@ export function SeriesView() {
   const rows = series.rows;
   const most_m = Math.max(...rows.map(({ range_std_m }) => Number(range_std_m)));
   const start = (): void => {
-    const settings = listed(harmonics.value).flatMap((m) =>
+    const sequences = listed(harmonics.value).flatMap((m) =>
       listed(exposures_us.value).flatMap((us) =>
-        listed(takes.value).map((n) => ({ sequence: { ...of("harmonics", m), ...of("exposure_s", us, 1e-6), ...of("takes", n) } })),
+        listed(takes.value).map((n) => ({ ...of("harmonics", m), ...of("exposure_s", us, 1e-6), ...of("takes", n) })),
       ),
     );
+    const computed = named("estimator", estimators.value).flatMap((by) =>
+      named("neighbours", neighbours.value).map((over) => ({ ...by, ...over })),
+    );
+    const settings = sequences.flatMap((sequence) => computed.map((reconstruction) => ({ sequence, reconstruction })));
     const region = askedRegion(measures.region.value);
     void task.run("", () => series.start({ settings, frames: numberOf(frames.value), target_m: numberOf(target_mm.value) * 1e-3, region }));
   };
@@ -63,6 +71,8 @@ export function SeriesView() {
           <TextField label="Takes" name="takes" placeholder={`${sequence.value?.takes ?? ""} now`} text={takes} />
           <NumberField label="Frames at each" unit="" name="frames" text={frames} />
           <NumberField label="Target" unit="mm" name="target" text={target_mm} />
+          <TextField label="Estimators" name="estimators" placeholder={`${now?.estimator ?? ""} now`} text={estimators} />
+          <TextField label="Neighbours" name="neighbours" placeholder={`${now?.neighbours ?? ""} now`} text={neighbours} />
           <Steer type="submit" class="primary" disabled={running}>
             Start
           </Steer>
@@ -114,12 +124,17 @@ export function SeriesView() {
 
 /** The numbers of a list; one that is NaN, for what stays as it is, of an empty one. */
 function listed(text: string): number[] {
-  return text.trim() === ""
-    ? [Number.NaN]
-    : text
-        .split(/[;,\s]+/)
-        .filter(Boolean)
-        .map(numberOf);
+  return text.trim() === "" ? [Number.NaN] : wordsOf(text).map(numberOf);
+}
+
+function wordsOf(text: string): string[] {
+  return text.split(/[;,\s]+/).filter(Boolean);
+}
+
+/** A field by each word of a list; none, for what stays as it is, of an empty one. */
+function named(field: string, text: string): Record<string, string>[] {
+  const words = wordsOf(text);
+  return words.length === 0 ? [{}] : words.map((word) => ({ [field]: word }));
 }
 
 function of(field: string, value: number, unit = 1): Record<string, number> {

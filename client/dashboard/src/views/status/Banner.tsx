@@ -9,7 +9,7 @@ import "./Banner.css";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
-  const { api, status, lease, lightOff, camera, asksForCamera, asksForToken } = useStore();
+  const { api, status, lease, lightOff, camera, dialog } = useStore();
   const connection = status.connection.value;
   const off = lightOff.state.value;
   if (off !== null && off.kind !== "sent") {
@@ -22,7 +22,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
   }
   if (connection.kind === "refused") {
     return (
-      <Alert about="token" word="Enter a token" onClick={() => (asksForToken.value = true)}>
+      <Alert about="token" word="Enter a token" onClick={() => (dialog.value = "token")}>
         <strong>Not let in.</strong> {tokenWords(api.credentials)}
       </Alert>
     );
@@ -37,7 +37,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
   const loss = status.cameraLoss.value;
   if (loss !== null && camera.value?.capabilities.model === "none" && connection.kind === "open") {
     return (
-      <Alert about="camera" word="Choose a camera" onClick={() => (asksForCamera.value = true)}>
+      <Alert about="camera" word="Choose a camera" onClick={() => (dialog.value = "camera")}>
         <strong>No camera.</strong> {sentence(loss.reason ?? "")}
       </Alert>
     );

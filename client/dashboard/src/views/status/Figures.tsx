@@ -3,6 +3,7 @@ import { deviation, engineering, fixed, grouped, NOTHING } from "../../scales/fo
 import { CREDIBLE_LATENCY_S } from "../../store/status";
 import { useStore } from "../../store/store";
 import { KEPT_S, linesOf, type PlotPoint, type Trend } from "../../store/trends";
+import { notJudgedWords } from "../../ui/flags";
 import { PulseIcon } from "../../ui/icons";
 import { PopoverButton } from "../../ui/PopoverButton";
 import "./Figures.css";
@@ -16,6 +17,7 @@ export function Figures() {
     if (latency_s < -0.05 || latency_s > CREDIBLE_LATENCY_S) return "clocks differ";
     return fixed(1000 * Math.max(0, latency_s), 0, "ms");
   });
+  const unjudged = notJudgedWords(rangeErrors.now.value?.not_judged);
   return (
     <PopoverButton face={<PulseIcon />} label="All figures" title="All figures of the flow of frames" kind="figures">
       <dl class="flow flow-trends">
@@ -32,6 +34,7 @@ export function Figures() {
           {useComputed(() => grouped(status.dropped.value))}
         </Figure>
       </dl>
+      {unjudged !== "" && <p class="small quiet flow-words" data-field="not-judged">{`Which ranges are trusted: ${unjudged}.`}</p>}
       <dl class="flow">
         <Figure name="Capture" field="capture" title="From the first exposure of a frame to the last">
           {useComputed(() => fixed(1000 * (status.newest.value?.capture_s ?? NaN), 1, "ms"))}

@@ -75,7 +75,7 @@ function Capture() {
 
 /** Who controls the camera; a click asks for control, or gives it back. */
 function ControlButton() {
-  const { lease, asksForControl, caller } = useStore();
+  const { lease, dialog, caller } = useStore();
   const control = lease.control.value;
   const barred = control.kind === "other" ? null : caller.obstacle.value;
   const words = barred !== null ? "View only" : control.kind === "us" ? "You have control" : "Take control";
@@ -86,7 +86,7 @@ function ControlButton() {
       title={barred === null ? "Who controls the camera" : `${barred}: it can look, but not take control`}
       data-field="control"
       data-obstacle={barred === null ? undefined : ""}
-      onClick={() => (asksForControl.value = true)}
+      onClick={() => (dialog.value = "control")}
     >
       <ControlIcon />
       {control.kind === "other" ? (

@@ -17,7 +17,7 @@ export function pageActions(store: Store): ActionGroup[] {
           text,
           run: () => store.showLayout(layout),
         })),
-        { text: "Save or remove a layout…", run: () => (store.asksForLayout.value = true) },
+        { text: "Save or remove a layout…", run: () => (store.dialog.value = "layout") },
         ...(store.layouts.undoable.value ? [{ text: "Undo the last change (Z)", run: () => store.layouts.undo() }] : []),
       ],
     },
@@ -41,19 +41,25 @@ export function pageActions(store: Store): ActionGroup[] {
     {
       title: "Help",
       actions: [
-        { text: "All commands (K)", run: () => (store.palette.value = true) },
-        { text: "Examples", run: () => (store.examples.value = true) },
-        { text: "Keys (?)", run: () => (store.help.value = true) },
+        { text: "All commands (K)", run: () => (store.dialog.value = "palette") },
+        { text: "Examples", run: () => (store.dialog.value = "examples") },
+        { text: "Keys (?)", run: () => (store.dialog.value = "help") },
+      ],
+    },
+    {
+      title: "Share",
+      actions: [
         { text: "Share this frame", run: () => void share(window, store) },
         { text: "Copy a link to what is shown", run: () => void copyLink(window, store) },
+        ...store.light.files.value.map(({ text, run }) => ({ text: `Light: ${text}`, run })),
       ],
     },
     {
       title: "Access",
       actions: [
-        { text: "Change the camera…", run: () => (store.asksForCamera.value = true) },
-        { text: "Take control…", run: () => (store.asksForControl.value = true) },
-        { text: "Token…", run: () => (store.asksForToken.value = true) },
+        { text: "Change the camera…", run: () => (store.dialog.value = "camera") },
+        { text: "Take control…", run: () => (store.dialog.value = "control") },
+        { text: "Token…", run: () => (store.dialog.value = "token") },
         ...(credentials.token.value === null ? [] : [{ text: "Forget the token", run: () => credentials.use(null) }]),
       ],
     },

@@ -7,7 +7,9 @@ import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
 import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import { npy, save, savePicture } from "../../ui/download";
+import { npy, save } from "../../ui/download";
+import { captionOf } from "../../ui/figure";
+import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useDrawing, usePictureSize, useProducts } from "../../ui/hooks";
 import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
 import { Panel } from "../../ui/Panel";
@@ -65,6 +67,21 @@ export function StreakView() {
     const density = streak.values[at.bin * streak.width + at.x] * 1e-9;
     return `column ${at.x} · ${fixed(time_s * 1e9, 1, "ns")} · ${fixed(rangeOfTime_m(time_s), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
   });
+  const scale = useComputed(() => scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3))));
+  const parts = (): FigureParts | null => {
+    const meta = frame.peek()?.meta;
+    if (meta === undefined) return null;
+    const [title, caption] = [`Density of row ${row.peek()} over time of flight`, captionOf(meta, store.sequence.peek())];
+    return {
+      title,
+      caption,
+      scale: scale.peek(),
+      colours: colours.peek(),
+      unit: "DN/ns",
+      ground: "black",
+      sides: 1e9 * store.period_s.peek(),
+    };
+  };
   const name = (): string => `streak-row-${row.peek()}-${frame.peek()?.meta.frame ?? 0}`;
   return (
     <Panel
@@ -81,7 +98,7 @@ export function StreakView() {
         </PopoverButton>
       }
       downloads={[
-        { text: "Picture (PNG)", run: () => savePicture(name(), canvas.current) },
+        ...pictureFiles(name, () => canvas.current, parts),
         { text: "Density in DN/s (NPY)", run: () => save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])) },
       ]}
     >
@@ -103,9 +120,7 @@ export function StreakView() {
           <canvas ref={canvas} class="cover" data-product="streak" />
           <Marks width={width} />
         </div>
-        {bright.value > 0 && (
-          <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />
-        )}
+        {bright.value > 0 && <ColourBar scale={scale.value} colours={colours.value} unit="DN/ns" />}
       </div>
       <footer class="panel-foot column spaced">
         <div class="panel-row wrapped apart">

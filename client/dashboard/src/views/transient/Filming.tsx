@@ -4,14 +4,21 @@ import type { Action } from "../../ui/ActionMenu";
 import { Button } from "../../ui/controls";
 import { save } from "../../ui/download";
 import type { FilmKind, Progress } from "../../ui/film";
-import { filmFrames, filmPass, type Subject } from "./film";
+import { filmPass, type Subject } from "./film";
 
-/** The film that is being made, if one is, and why the last one was not. */
-export class Filming {
+/** The film that is being made, if one is. */
+export class Filming implements Progress {
   /** Share that is done, 0 to 1; null while no film is made. */
   readonly share: Signal<number | null> = signal(null);
-  readonly trouble = signal("");
   readonly #cancelled = signal(false);
+
+  get cancelled(): boolean {
+    return this.#cancelled.value;
+  }
+
+  report(share: number): void {
+    this.share.value = share;
+  }
 
   cancel(): void {
     this.#cancelled.value = true;
@@ -19,40 +26,24 @@ export class Filming {
 
   /** Films to choose from. */
   actions(subject: Subject, store: Store): Action[] {
-    const run = (make: typeof filmPass, name: string, kind: FilmKind) => (): void => {
-      void this.#make(
-        () => make(subject, store, kind, this.#progress()),
-        `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`,
-      );
+    const run = (kind: FilmKind) => (): void => {
+      const name = `pass-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`;
+      void this.#make(store, () => filmPass(subject, store, kind, this), name);
     };
-    const kinds: readonly (readonly [FilmKind, string])[] = [
-      ["webm", "WebM"],
-      ["gif", "GIF"],
+    return [
+      { text: "Film of one pass (WebM)", run: run("webm") },
+      { text: "Film of one pass (GIF)", run: run("gif") },
     ];
-    return kinds.flatMap(([kind, text]) => [
-      { text: `Film of one pass (${text})`, run: run(filmPass, "pass", kind) },
-      { text: `Film of 30 frames (${text})`, run: run(filmFrames, "frames", kind) },
-    ]);
   }
 
-  #progress(): Progress {
-    const cancelled = this.#cancelled;
-    return {
-      get cancelled() {
-        return cancelled.value;
-      },
-      report: (share) => (this.share.value = share),
-    };
-  }
-
-  async #make(make: () => Promise<Blob | null>, name: string): Promise<void> {
+  async #make({ events }: Store, make: () => Promise<Blob | null>, name: string): Promise<void> {
     if (this.share.peek() !== null) return; // one film at a time
-    [this.share.value, this.trouble.value, this.#cancelled.value] = [0, "", false];
+    [this.share.value, this.#cancelled.value] = [0, false];
     try {
       const film = await make();
       if (film !== null) save(name, film);
     } catch (error) {
-      this.trouble.value = `No film was made: ${error instanceof Error ? error.message : String(error)}`;
+      events.tell(`No film was made: ${error instanceof Error ? error.message : String(error)}`, "bad");
     } finally {
       this.share.value = null;
     }
@@ -61,14 +52,6 @@ export class Filming {
 
 /** How far the film is; nothing while none is made. */
 export function FilmProgress({ filming }: { filming: Filming }) {
-  if (filming.trouble.value !== "") {
-    return (
-      <div class="panel-row wrapped apart nowrap filming" role="alert">
-        <span>{filming.trouble.value}</span>
-        <Button onClick={() => (filming.trouble.value = "")}>Dismiss</Button>
-      </div>
-    );
-  }
   if (filming.share.value === null) return null;
   return (
     <div class="panel-row wrapped apart nowrap filming" role="status">

@@ -42,14 +42,6 @@ export function TransientView() {
   const frame = store.frames.of("coefficients");
   const { player, light: look } = store;
   const filming = useMemo(() => new Filming(), []);
-  // A film ends with the picture that it is taken of.
-  useEffect(
-    () => () => {
-      filming.cancel();
-      look.snapshot = () => null;
-    },
-    [look, filming],
-  );
   useDrawing(() => {
     const arrivals = frame.value?.light?.arrivals;
     if (arrivals === undefined) return;
@@ -61,12 +53,21 @@ export function TransientView() {
   const play = look.play.value;
   const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
   const figureName = (): string => `${look.play.peek()}-${Math.round(player.time_s.peek() * 1e12)}ps-${frame.peek()?.meta.frame ?? 0}`;
+  const files = [...pictureFiles(figureName, subject.snapshot, subject.parts), ...filming.actions(subject, store)];
+  useEffect(() => {
+    look.files.value = files;
+    // A film ends with the picture that it is taken of.
+    return () => {
+      filming.cancel();
+      [look.snapshot, look.files.value] = [() => null, []];
+    };
+  }, [look, filming]);
   return (
     <Panel
       name="transient"
       title={<h2>Light</h2>}
       downloads={[
-        ...pictureFiles(figureName, subject.snapshot, subject.parts),
+        ...files,
         {
           text: "Strip of 8 times (PNG)",
           run: () => {
@@ -81,7 +82,6 @@ export function TransientView() {
             savePicture(`${look.play.peek()}-strip-${frame.peek()?.meta.frame ?? 0}`, strip);
           },
         },
-        ...filming.actions(subject, store),
         { text: "Coefficients (NPY)", run: () => saveNumbers(store.api, frame.peek()) },
       ]}
       tools={
@@ -98,7 +98,7 @@ export function TransientView() {
       <footer class="panel-foot column spaced">
         <p class="panel-row small quiet">
           Light crosses the room, slowed {slowness(player.speed_ns.value)} times. Click a pixel to see when its light came back.{" "}
-          <Button class="link" onClick={() => (store.examples.value = true)}>
+          <Button class="link" onClick={() => (store.dialog.value = "examples")}>
             More to see
           </Button>
         </p>

@@ -1,8 +1,6 @@
-/** Films of the light: one pass of it, or the next frames of the camera. */
+/** Films of the light: one pass of it. */
 import { rangeOfTime_m } from "../../physics/constants";
-import type { Frame } from "../../store/frames";
 import type { Store } from "../../store/store";
-import { until } from "../../store/until";
 import { figureLayout, figureSvg, timeWords } from "../../ui/figure";
 import { type FigureParts, imageOf } from "../../ui/figureFiles";
 import { type FilmKind, type Progress, recorderOf } from "../../ui/film";
@@ -12,10 +10,6 @@ const PICTURE_PX = 490;
 /** Pictures a second of one pass, and the most in it. */
 const RATE_HZ = 20;
 const MOST_PICTURES = 240;
-/** Frames of a film of the camera, and the longest that one of them is shown. */
-const LIVE_FRAMES = 30;
-const LONGEST_S = 2;
-const FIRST_S = 0.1;
 
 /** What a film is made of: the picture now, and what is written around it. */
 export type Subject = Readonly<{ snapshot: () => HTMLCanvasElement | null; parts: () => FigureParts }>;
@@ -75,49 +69,4 @@ export async function filmPass(subject: Subject, store: Store, kind: FilmKind, p
   } finally {
     [player.turn.value, player.playing.value, held.value] = [before.turn, before.playing, before.held];
   }
-}
-
-/** Why no more frames come; null where they do. Read in an effect, it is followed. */
-function standstill({ replay, held, status }: Store): string | null {
-  if (replay.active.value) return replay.playing.value ? null : "the recording is paused.";
-  if (held.value) return "the frame is held.";
-  if (status.cameraLoss.value !== null) return "the camera is lost.";
-  return status.running.value === false ? "the camera is stopped." : null;
-}
-
-/**
- * The next frames of the camera, each for as long as it took; null where it was cancelled.
- *
- * It is shorter where frames cease to come. Raises Error where none comes at all.
- */
-export async function filmFrames(subject: Subject, store: Store, kind: FilmKind, progress: Progress): Promise<Blob | null> {
-  const plate = await plateOf(subject, store);
-  if (plate === null) return null;
-  const recorder = await recorderOf(plate.canvas, kind);
-  let shown = store.frames.of("coefficients").peek();
-  let count = 0;
-  for (; count < LIVE_FRAMES; count++) {
-    const next = await frameAfter(store, shown, progress);
-    if (next === null) break;
-    const took_s = shown === null ? FIRST_S : Math.abs(next.meta.host_time_s - shown.meta.host_time_s);
-    shown = next;
-    plate.draw();
-    // A WebM is stamped by the clock: the wait for the next frame is what its picture lasts.
-    await recorder.add(kind === "gif" || count === LIVE_FRAMES - 1 ? Math.min(LONGEST_S, took_s) : 0);
-    progress.report((count + 1) / LIVE_FRAMES);
-  }
-  const film = await recorder.finish();
-  if (progress.cancelled) return null;
-  if (count === 0) throw new Error(standstill(store) ?? "no frame came.");
-  return film;
-}
-
-/** The next frame after one; null where the film was cancelled meanwhile, or frames ceased to come. */
-function frameAfter(store: Store, shown: Frame | null, progress: Progress): Promise<Frame | null> {
-  const newest = store.frames.of("coefficients");
-  return until(() => {
-    const frame = newest.value;
-    if (progress.cancelled || standstill(store) !== null) return null;
-    return frame === null || frame === shown ? undefined : frame;
-  });
 }
