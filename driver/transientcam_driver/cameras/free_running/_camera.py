@@ -12,7 +12,7 @@ from transientcam_driver.cameras.free_running._frequencies import common_base
 from transientcam_driver.cameras.free_running._measurement import Capture, Description
 from transientcam_driver.cameras.free_running._rendering import BITS, Renderer
 from transientcam_driver.cameras.streamed import StreamedCamera, same
-from transientcam_driver.errors import CameraLost, ProtocolError
+from transientcam_driver.errors import CameraError, CameraLost, ProtocolError
 from transientcam_driver.sequence import Sampling
 from transientcam_supervisor import OffSwitch
 
@@ -197,13 +197,12 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         while not ended.is_set():
             found: Capture | CameraLost | None
             try:
-                found = device.receive(RECEIVE_S)
-                if not isinstance(found, Capture | None):
-                    raise TypeError(f"{found!r:.60} is no Capture")
-            except CameraLost as error:
-                found = error
-            except Exception as error:  # of a plug-in: the camera is lost, and it says by what
-                found = CameraLost(f"receive() raised {error!r}")
+                came: object = device.receive(RECEIVE_S)  # of a plug-in: anything
+                if not isinstance(came, Capture | None):
+                    raise CameraLost(f"{came!r:.60} is no Capture")
+                found = came
+            except CameraError as error:
+                found = error if isinstance(error, CameraLost) else CameraLost(str(error))
             if found is None:
                 continue
             with self._arrived:

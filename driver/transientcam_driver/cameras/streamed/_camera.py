@@ -7,8 +7,10 @@ import warnings
 import weakref
 from abc import abstractmethod
 from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import suppress
-from typing import Final, Generic, Protocol, TypeVar
+from functools import partial
+from typing import Any, Final, Generic, Protocol, TypeVar, cast
 
 from transientcam_driver.camera import (
     AppliedSequence,
@@ -23,6 +25,7 @@ from transientcam_driver.errors import (
     CameraError,
     CameraLost,
     CameraNotFound,
+    DriverError,
     FrameTimeout,
     NotStreaming,
 )
@@ -30,6 +33,9 @@ from transientcam_driver.sequence import Sequence
 
 SILENCE_S: Final = 2.0
 UNREAD_S: Final = 2.0
+HANGS_S: Final = 5.0
+SLOW_S: Final = 30.0
+"""When a call of a plug-in's device counts as hung; the latter is of connecting and starting."""
 READ_S: Final = 0.1
 """Longest wait for a frame in one go: how long a loss may stay unnoticed."""
 
@@ -45,16 +51,59 @@ _T = TypeVar("_T")
 
 
 def same(connect: Callable[[], _D], serial_of: Callable[[_D], str]) -> Callable[[str | None], _D]:
-    """Return what connects, and raises CameraNotFound where the serial number is another one."""
+    """Return what connects a plug-in's device, whose calls then end (`within`).
+
+    It raises CameraNotFound where the serial number is another one.
+    """
 
     def again(serial: str | None) -> _D:
-        device = connect()
+        device = cast("_D", _Bounded(within(SLOW_S, "connect", connect)))
         if serial in (None, serial_of(device)):
             return device
         device.close()
         raise CameraNotFound(str(serial))
 
     return again
+
+
+def within(limit_s: float, name: str, call: Callable[..., _T], *given: Any) -> _T:
+    """Return what a call of a plug-in returns, on a thread that is left behind if it hangs.
+
+    Raises CameraLost, naming the call, where that takes longer or raises what is no DriverError.
+    """
+    answer: Future[_T] = Future()
+
+    def run() -> None:
+        try:
+            answer.set_result(call(*given))
+        except BaseException as error:  # raised below
+            answer.set_exception(error)
+
+    try:
+        threading.Thread(target=run, name=f"device-{name}", daemon=True).start()
+    except RuntimeError:  # none starts while the interpreter ends
+        run()
+    try:
+        return answer.result(limit_s)
+    except DriverError:
+        raise
+    except Exception as error:
+        if not answer.done():
+            raise CameraLost(f"{name}() has not returned for {limit_s:g} s") from None
+        raise CameraLost(f"{name}() raised {error!r}") from error
+
+
+class _Bounded:
+    """A device whose methods end."""
+
+    def __init__(self, device: Any) -> None:
+        self._device = device
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._device, name)
+        if not callable(found):
+            return found
+        return partial(within, SLOW_S if name == "start" else HANGS_S, name, found)
 
 
 class StreamedCamera(HostCamera, Generic[_D, _A]):
@@ -304,7 +353,8 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
     def _give_back(self) -> None:
         """Close the device, once."""
         if self._release.detach():
-            self._device.close()
+            with suppress(CameraLost):  # it never fails, but may hang
+                self._device.close()
 
     # --- under _control ----------------------------------------------------------------------
 
