@@ -6,7 +6,7 @@ import time
 import warnings
 import weakref
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
@@ -50,14 +50,17 @@ _A = TypeVar("_A")
 _T = TypeVar("_T")
 
 
-def same(connect: Callable[[], _D], serial_of: Callable[[_D], str]) -> Callable[[str | None], _D]:
+def same(
+    connect: Callable[[], _D], serial_of: Callable[[_D], str], **limits_s: float
+) -> Callable[[str | None], _D]:
     """Return what connects a plug-in's device, whose calls then end (`within`).
 
-    It raises CameraNotFound where the serial number is another one.
+    It raises CameraNotFound where the serial number is another one. ``limits_s``: of calls by their
+    names, other than `HANGS_S`.
     """
 
     def again(serial: str | None) -> _D:
-        device = cast("_D", _Bounded(within(SLOW_S, "connect", connect)))
+        device = cast("_D", _Bounded(within(SLOW_S, "connect", connect), limits_s))
         if serial in (None, serial_of(device)):
             return device
         device.close()
@@ -69,7 +72,8 @@ def same(connect: Callable[[], _D], serial_of: Callable[[_D], str]) -> Callable[
 def within(limit_s: float, name: str, call: Callable[..., _T], *given: Any) -> _T:
     """Return what a call of a plug-in returns, on a thread that is left behind if it hangs.
 
-    Raises CameraLost, naming the call, where that takes longer or raises what is no DriverError.
+    Without a limit the thread is the caller's. Raises CameraLost, naming the call, where it takes
+    longer or raises what is no DriverError.
     """
     answer: Future[_T] = Future()
 
@@ -80,11 +84,12 @@ def within(limit_s: float, name: str, call: Callable[..., _T], *given: Any) -> _
             answer.set_exception(error)
 
     try:
-        threading.Thread(target=run, name=f"device-{name}", daemon=True).start()
+        thread = threading.Thread(target=run, name=f"device-{name}", daemon=True)
+        (thread.start if math.isfinite(limit_s) else run)()
     except RuntimeError:  # none starts while the interpreter ends
         run()
     try:
-        return answer.result(limit_s)
+        return answer.result(limit_s if math.isfinite(limit_s) else None)
     except DriverError:
         raise
     except Exception as error:
@@ -96,14 +101,14 @@ def within(limit_s: float, name: str, call: Callable[..., _T], *given: Any) -> _
 class _Bounded:
     """A device whose methods end."""
 
-    def __init__(self, device: Any) -> None:
-        self._device = device
+    def __init__(self, device: Any, limits_s: Mapping[str, float]) -> None:
+        self._device, self._limits_s = device, limits_s
 
     def __getattr__(self, name: str) -> Any:
         found = getattr(self._device, name)
         if not callable(found):
             return found
-        return partial(within, SLOW_S if name == "start" else HANGS_S, name, found)
+        return partial(within, self._limits_s.get(name, HANGS_S), name, found)
 
 
 class StreamedCamera(HostCamera, Generic[_D, _A]):
