@@ -103,6 +103,8 @@ def test_a_daemon_serves_its_range(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0.85 < stated_m["median"] / off_m.std() < 1.15
     assert np.mean(flags == 0) > 0.99
     assert "needs consecutive multiples" in absent["transient"]
+    assert "needs 3 frequencies" in absent["indirect"]
+    assert "direct" not in absent
 
 
 def test_what_is_no_tof_camera_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

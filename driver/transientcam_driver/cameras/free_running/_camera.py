@@ -1,5 +1,6 @@
 """A `Camera` of a device that captures by itself."""
 
+import math
 import threading
 from collections.abc import Callable
 from typing import Any, Final, Protocol
@@ -11,8 +12,8 @@ from transientcam_driver.camera import AppliedSequence, Capabilities, FactoryCal
 from transientcam_driver.cameras.free_running._frequencies import common_base
 from transientcam_driver.cameras.free_running._measurement import Capture, Description
 from transientcam_driver.cameras.free_running._rendering import BITS, Renderer
-from transientcam_driver.cameras.streamed import StreamedCamera, same
-from transientcam_driver.errors import CameraLost, ProtocolError
+from transientcam_driver.cameras.streamed import SLOW_S, StreamedCamera, same
+from transientcam_driver.errors import CameraError, CameraLost, ProtocolError
 from transientcam_driver.sequence import Sampling
 from transientcam_supervisor import OffSwitch
 
@@ -88,7 +89,11 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         self._number = self._lost = 0
         self._spoilt = ""  # why the last frame was not whole
         self._clocks_s = 0.0, 0.0  # of the device and of this machine, at its last frame
-        super().__init__(same(connect, lambda device: device.description.serial), **others)
+        # `receive` has a thread of its own, which is left behind where it hangs
+        limits_s = {"start": SLOW_S, "receive": math.inf}
+        super().__init__(
+            same(connect, lambda device: device.description.serial, **limits_s), **others
+        )
 
     def _describe(self) -> None:
         about = self._device.description
@@ -197,13 +202,12 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         while not ended.is_set():
             found: Capture | CameraLost | None
             try:
-                found = device.receive(RECEIVE_S)
-                if not isinstance(found, Capture | None):
-                    raise TypeError(f"{found!r:.60} is no Capture")
-            except CameraLost as error:
-                found = error
-            except Exception as error:  # of a plug-in: the camera is lost, and it says by what
-                found = CameraLost(f"receive() raised {error!r}")
+                came: object = device.receive(RECEIVE_S)  # of a plug-in: anything
+                if not isinstance(came, Capture | None):
+                    raise CameraLost(f"{came!r:.60} is no Capture")
+                found = came
+            except CameraError as error:
+                found = error if isinstance(error, CameraLost) else CameraLost(str(error))
             if found is None:
                 continue
             with self._arrived:

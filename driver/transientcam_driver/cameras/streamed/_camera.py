@@ -6,9 +6,11 @@ import time
 import warnings
 import weakref
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from contextlib import suppress
-from typing import Final, Generic, Protocol, TypeVar
+from functools import partial
+from typing import Any, Final, Generic, Protocol, TypeVar, cast
 
 from transientcam_driver.camera import (
     AppliedSequence,
@@ -23,6 +25,7 @@ from transientcam_driver.errors import (
     CameraError,
     CameraLost,
     CameraNotFound,
+    DriverError,
     FrameTimeout,
     NotStreaming,
 )
@@ -30,6 +33,9 @@ from transientcam_driver.sequence import Sequence
 
 SILENCE_S: Final = 2.0
 UNREAD_S: Final = 2.0
+HANGS_S: Final = 5.0
+SLOW_S: Final = 30.0
+"""When a call of a plug-in's device counts as hung; the latter is of connecting and starting."""
 READ_S: Final = 0.1
 """Longest wait for a frame in one go: how long a loss may stay unnoticed."""
 
@@ -44,17 +50,65 @@ _A = TypeVar("_A")
 _T = TypeVar("_T")
 
 
-def same(connect: Callable[[], _D], serial_of: Callable[[_D], str]) -> Callable[[str | None], _D]:
-    """Return what connects, and raises CameraNotFound where the serial number is another one."""
+def same(
+    connect: Callable[[], _D], serial_of: Callable[[_D], str], **limits_s: float
+) -> Callable[[str | None], _D]:
+    """Return what connects a plug-in's device, whose calls then end (`within`).
+
+    It raises CameraNotFound where the serial number is another one. ``limits_s``: of calls by their
+    names, other than `HANGS_S`.
+    """
 
     def again(serial: str | None) -> _D:
-        device = connect()
+        device = cast("_D", _Bounded(within(SLOW_S, "connect", connect), limits_s))
         if serial in (None, serial_of(device)):
             return device
         device.close()
         raise CameraNotFound(str(serial))
 
     return again
+
+
+def within(limit_s: float, name: str, call: Callable[..., _T], *given: Any) -> _T:
+    """Return what a call of a plug-in returns, on a thread that is left behind if it hangs.
+
+    Without a limit the thread is the caller's. Raises CameraLost, naming the call, where it takes
+    longer or raises what is no DriverError.
+    """
+    answer: Future[_T] = Future()
+
+    def run() -> None:
+        try:
+            answer.set_result(call(*given))
+        except BaseException as error:  # raised below
+            answer.set_exception(error)
+
+    try:
+        thread = threading.Thread(target=run, name=f"device-{name}", daemon=True)
+        (thread.start if math.isfinite(limit_s) else run)()
+    except RuntimeError:  # none starts while the interpreter ends
+        run()
+    try:
+        return answer.result(limit_s if math.isfinite(limit_s) else None)
+    except DriverError:
+        raise
+    except Exception as error:
+        if not answer.done():
+            raise CameraLost(f"{name}() has not returned for {limit_s:g} s") from None
+        raise CameraLost(f"{name}() raised {error!r}") from error
+
+
+class _Bounded:
+    """A device whose methods end."""
+
+    def __init__(self, device: Any, limits_s: Mapping[str, float]) -> None:
+        self._device, self._limits_s = device, limits_s
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._device, name)
+        if not callable(found):
+            return found
+        return partial(within, self._limits_s.get(name, HANGS_S), name, found)
 
 
 class StreamedCamera(HostCamera, Generic[_D, _A]):
@@ -304,7 +358,8 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
     def _give_back(self) -> None:
         """Close the device, once."""
         if self._release.detach():
-            self._device.close()
+            with suppress(CameraLost):  # it never fails, but may hang
+                self._device.close()
 
     # --- under _control ----------------------------------------------------------------------
 

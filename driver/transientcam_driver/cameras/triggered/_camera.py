@@ -130,10 +130,6 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
             images = self._device.receive(timeout_s)
         except ImagesLost as error:
             return partial, error
-        except CameraError:
-            raise
-        except Exception as error:  # of a plug-in: the camera is lost, and it says by what
-            raise CameraLost(f"receive() raised {error!r}") from error
         return None if images is None else (partial, images)
 
     def _step(self, timeout_s: float) -> PartialFrame | None:

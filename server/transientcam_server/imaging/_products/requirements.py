@@ -1,11 +1,15 @@
 """What products need of a camera: its frequencies, its noise, and the truth of a simulation."""
 
 from collections.abc import Collection
+from typing import Final
 
 from transientcam_driver import Capabilities, Sampling
 from transientcam_moments import PluginFailed
 from transientcam_server.imaging._products.products import Product, product_names, product_of
 from transientcam_server.imaging._recipe.recipe import listed
+
+LEAST_TO_SEPARATE: Final = 3
+"""Frequencies with gaps that tell more than one return: fewer are `unwrapped-phase`'s alone."""
 
 
 def absent_products(
@@ -49,4 +53,6 @@ def unmet(product: Product, sampling: Sampling, zeroths: Collection[str]) -> str
         return f"it needs consecutive multiples of one frequency, and {measured}"
     if product.of_brightness and set(zeroths) == {"estimated"}:
         return f"it needs a zeroth moment, which cannot be estimated: {measured}"
+    if product.name == "indirect" and len(sampling.multiples) < LEAST_TO_SEPARATE:
+        return f"it needs {LEAST_TO_SEPARATE} frequencies, as one return is assumed: {measured}"
     return None

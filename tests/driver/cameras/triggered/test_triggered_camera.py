@@ -1,5 +1,6 @@
 """Cameras that expose on request: order, settling, losses, and no unrequested light."""
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -18,6 +19,7 @@ from transientcam_driver import (
     SubPhases,
 )
 from transientcam_driver.camera import CameraState
+from transientcam_driver.cameras.streamed import _camera as streamed
 from transientcam_driver.clock import VirtualClock
 
 NONE = SubPhases("none")
@@ -176,6 +178,42 @@ def test_a_device_that_returns_or_raises_something_else_is_lost_with_the_reason(
     with Cable().camera() as camera:
         camera.start()
         with pytest.raises(CameraLost, match=reason):
+            camera.read_frame()
+
+
+CALLS = ["configure", "prepare", "trigger", "receive", "temperature_c", "light_off"]
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_a_call_that_hangs_is_left_behind_and_the_camera_comes_back(
+    monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    """Also where giving the device back hangs: the next one is another."""
+    ends = threading.Event()
+    with Cable().camera() as camera:
+        camera.start()
+        with monkeypatch.context() as hung:
+            hung.setattr(streamed, "HANGS_S", 0.05)
+            for each in (call, "close"):
+                hung.setattr(ScriptedDevice, each, lambda self, *_: ends.wait())
+            with pytest.raises(CameraLost, match=rf"{call}\(\) has not returned for 0.05 s"):
+                {"configure": lambda: camera.configure(ONE), "light_off": camera.stop}.get(
+                    call, camera.read_frame
+                )()
+            assert camera.state == CameraState.DISCONNECTED
+            with pytest.raises(CameraLost, match="disconnected"):
+                camera.status()
+        ends.set()
+        camera.reconnect()
+        camera.start()
+        assert camera.read_frame().images.shape
+
+
+def test_what_any_call_raises_is_a_loss_with_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Cable().camera() as camera:
+        camera.start()
+        monkeypatch.setattr(ScriptedDevice, "prepare", lambda self, _: ODD["settle"])
+        with pytest.raises(CameraLost, match=r"prepare\(\) raised KeyError\('settle'\)"):
             camera.read_frame()
 
 
