@@ -242,11 +242,11 @@ def _given_back(
     height, width = known.shape
     row = width + REACH  # flat, with a margin between rows that serves both of them
     least = np.finfo(weight.dtype).tiny
-    both = xp.pad(xp.stack([late, known]), [(0, 0), (REACH, REACH), (0, REACH)])
-    both = xp.pad(both.reshape((2, -1)), [(0, 0), (REACH, REACH)])
-    clearest, best = xp.zeros_like(both[0, : height * row]), xp.zeros_like(both[:, : height * row])
+    both = xp.pad(xp.stack([late, known]), [(0, 0), (REACH + 1, REACH + 1), (0, REACH)])
+    both, size = both.reshape((2, -1)), height * row
+    clearest, best = xp.zeros_like(both[0, :size]), xp.zeros_like(both[:, :size])
     for line in LINES:
-        sums = _along(both, height * row, *(by * row + column for by, column in line))
+        sums = _along(both, size, *(by * row + column for by, column in line))
         clear = sums[0] ** 2 / xp.maximum(sums[1], least)
         new = (clear > clearest).astype(clear.dtype)  # by products: no branch for each pixel
         best = (1 - new) * best + new * sums
