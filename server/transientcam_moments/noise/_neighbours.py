@@ -1,9 +1,6 @@
 """Averaging moments over neighbouring pixels, but not across edges: adaptive weights."""
 
-import math
 from collections.abc import Callable
-from functools import reduce
-from operator import add
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -35,15 +32,12 @@ EXPECTED: Final = 5.0
 """Chi-square of the clearest line of residuals that noise explains."""
 CLEAR: Final = 12.0
 """And from which it is taken back: noise exceeds it in one pixel of five thousand."""
-_SLOPES: Final = ((1, 0), (0, 1), (1, 1), (1, -1), (1, 0.5), (1, -0.5), (0.5, 1), (-0.5, 1))
-LINES: Final = tuple(
-    dict.fromkeys(
-        tuple((whole(by_row * i), whole(by_column * i)) for i in range(-REACH, REACH + 1))
-        for by_row, by_column in _SLOPES
-        for whole in (math.floor, math.ceil)
-    )
-)
-"""Rows and columns of their pixels, in eight directions."""
+LINES: Final = (
+    ((0, 1), (0, 2)), ((1, 0), (2, 0)), ((1, 1), (2, 2)), ((1, -1), (2, -2)),
+    ((1, 0), (2, 1)), ((-1, 0), (-2, -1)), ((1, 0), (2, -1)), ((-1, 0), (-2, 1)),
+    ((0, 1), (1, 2)), ((0, -1), (-1, -2)), ((0, 1), (-1, 2)), ((0, -1), (1, -2)),
+)  # fmt: skip
+"""In eight directions: rows and columns from every other pixel to the next, and the one after."""
 
 
 class Averaged(NamedTuple):
@@ -243,21 +237,39 @@ def _given_back(
     xp = namespace(off)
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
     scaled = order * weight
-    late = (scaled * (current.real * off.imag - current.imag * off.real)).sum(0)
+    late = (scaled * (current.conj() * off).imag).sum(0)
     known = (order * scaled * squared(current)).sum(0)
-    clearest, shift, part = (xp.zeros_like(known) for _ in range(3))
-    both = _padded(xp.stack([late, known]))
+    height, width = known.shape
+    row = width + REACH  # flat, with a margin between rows that serves both of them
+    least = np.finfo(weight.dtype).tiny
+    both = xp.pad(xp.stack([late, known]), [(0, 0), (REACH + 1, REACH + 1), (0, REACH)])
+    both, size = both.reshape((2, -1)), height * row
+    clearest, best = xp.zeros_like(both[0, :size]), xp.zeros_like(both[:, :size])
     for line in LINES:
-        later, together = reduce(add, (_shifted(both, *offset) for offset in line))
-        together = xp.maximum(together, np.finfo(weight.dtype).tiny)
-        clear = later**2 / together
-        shift = xp.where(clear > clearest, later / together, shift)
-        part = xp.where(clear > clearest, known / together, part)
+        sums = _along(both, size, *(by * row + column for by, column in line))
+        clear = sums[0] ** 2 / xp.maximum(sums[1], least)
+        new = (clear > clearest).astype(clear.dtype)  # by products: no branch for each pixel
+        best = (1 - new) * best + new * sums
         clearest = xp.maximum(clear, clearest)
+    shift, whole, clearest = (each.reshape((height, row))[:, :width] for each in (*best, clearest))
+    whole = xp.maximum(whole, least)
     back = clearest > CLEAR
-    turned = (1j * order * xp.where(back, shift, 0)).astype(current.dtype)
-    doubt = xp.where(back, 1, xp.maximum(clearest - EXPECTED, 0)) * part
+    turned = (1j * order * xp.where(back, shift / whole, 0)).astype(current.dtype)
+    doubt = xp.where(back, 1, xp.maximum(clearest - EXPECTED, 0)) * known / whole
     return current + turned * current, xp.minimum(share + doubt, 1).astype(share.dtype)
+
+
+def _along(planes: Array, length: int, near: int, far: int) -> Array:
+    """Return sums over lines of nine around the middle pixels, so many, of flat planes.
+
+    Each second pixel of a line is ``far`` beyond the last, and has another one ``near`` it.
+    """
+    first = (planes.shape[-1] - length) // 2
+    start, last, sums = first - 2 * far, first + 2 * far, planes
+    for step in (near, far, 2 * far):
+        sums = sums[:, : -abs(step)] + sums[:, abs(step) :]
+        start += min(step, 0)
+    return sums[:, start : start + length] + planes[:, last : last + length]
 
 
 def _padded(planes: Array) -> Array:

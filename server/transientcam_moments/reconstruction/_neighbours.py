@@ -64,6 +64,8 @@ def over_neighbours(
     if frames is not None:
         noise = MomentNoise(noise.variance / frames)
     masks = [namespace(moments).asarray(each) for each in left_out if each is not None]
+    if images is not None and images.saturated_pixels is not None:  # recovered, or NaN
+        masks = [each & ~images.saturated_pixels for each in masks]
     found = average_neighbours(
         moments,
         noise,

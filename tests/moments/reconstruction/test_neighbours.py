@@ -63,6 +63,22 @@ def test_without_a_sensor_the_images_tell_the_noise() -> None:
     assert np.median(abs(found.smoothed - stated.smoothed)) < 0.5
 
 
+def test_saturated_pixels_that_are_recovered_are_averaged_like_others() -> None:
+    raw = captured(halves(900.0, 900.0), "low-frequency")
+    brightest = raw[np.argmax(raw.mean(axis=(1, 2)))]
+    settings = replace(SETTINGS, full_scale=float(np.quantile(brightest, 0.2)))
+    clipped = np.minimum(raw, settings.full_scale)
+    whole = reconstructed(raw, replace(SETTINGS, full_scale=np.inf))
+
+    found = reconstructed(clipped, settings)
+
+    recovered = (np.asarray(found.flags) & tm.Flags.SATURATED > 0) & found.has_range
+    assert recovered.mean() > 0.5
+    assert whole.variance_share is not None
+    assert found.variance_share is not None
+    assert np.median(found.variance_share[recovered]) < 2 * np.median(whole.variance_share)
+
+
 @pytest.mark.parametrize("pixels", ["image", "few"])
 def test_where_nothing_tells_the_noise_it_is_the_gaussian(pixels: str) -> None:
     raw = captured(halves(900.0, 700.0), "low-frequency")
