@@ -52,9 +52,14 @@ def test_a_camera_without_sub_phases_is_planned_for_with_what_it_can_do(
     fixed: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Sub-phases of the default sequence are what an OPT8241 cannot do."""
-    given = {"brightness_dn_per_s": 8e5, "returns": ["1.5"], "fixed": fixed}
-
-    plan_verb.plan(camera="opt8241:emulated", **given, range_error_m=0.05, as_json=True)
+    plan_verb.plan(
+        camera="opt8241:emulated",
+        brightness_dn_per_s=8e5,
+        returns=["1.5"],
+        fixed=fixed,
+        range_error_m=0.05,
+        as_json=True,
+    )
 
     sequence = json.loads(capsys.readouterr().out)["sequence"]
     assert sequence["sub_phases"] == {"scheme": "none", "n": 1}
