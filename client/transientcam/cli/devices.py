@@ -4,15 +4,15 @@ Each kind of camera lists its own, through its entry point of the group ``transi
 """
 
 import json
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from datetime import datetime
 from importlib.metadata import EntryPoint, entry_points
 from itertools import chain
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from transientcam.cli import presence
 from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, echo
 from transientcam.cli.verbs import extra_of
@@ -49,7 +49,7 @@ def devices(
     lists the products that it cannot give, each with the reason.
     """
     if watch:
-        presence.watch(lambda: _searched(timeout_s, interface), now=datetime.now, as_json=as_json)
+        print_changes(lambda: _searched(timeout_s, interface), now=datetime.now, as_json=as_json)
     document = {**cameras_here(network=network), "network": [], "network_problem": None}
     console = Terminal(stderr=True)
     if network:
@@ -152,3 +152,40 @@ def _print(document: dict[str, Any], *, network: bool) -> None:
 
 def _rows(cameras: list[dict[str, Any]], *names: str) -> list[list[str]]:
     return [[camera[name] or "?" for name in names] for camera in cameras]
+
+
+Change = Literal["here", "gone"]
+MISSED: Final = 3
+"""Searches in a row without an answer until a daemon counts as gone: mDNS may lose a packet."""
+
+
+class Presence:
+    """Who was found so far, and who of them is still there."""
+
+    def __init__(self) -> None:
+        self._known: dict[FoundCamera, int] = {}
+
+    def update(self, found: Iterable[FoundCamera]) -> Iterator[tuple[Change, FoundCamera]]:
+        """Take the result of a search, and return what has changed; a new address is a new one."""
+        present = set(found)
+        for camera in sorted(present - self._known.keys(), key=lambda each: each.name):
+            yield "here", camera
+        missing = {camera: missed + 1 for camera, missed in self._known.items()}
+        self._known = missing | dict.fromkeys(present, 0)
+        for camera in [each for each, missed in self._known.items() if missed == MISSED]:
+            del self._known[camera]
+            yield "gone", camera
+
+
+def print_changes(
+    search: Callable[[], Iterable[FoundCamera]], *, now: Callable[[], datetime], as_json: bool
+) -> None:
+    """Search again and again, and print a line for each change, until it is interrupted."""
+    presence = Presence()
+    while True:
+        for change, camera in presence.update(search()):
+            time = now().isoformat(sep=" ", timespec="seconds")
+            if as_json:
+                echo(json.dumps({"time": time, "change": change, **asdict(camera)}))
+            else:
+                echo(f"{time}  {change}  {camera.url}  {camera.serial or '?'}  {camera.name}")

@@ -22,7 +22,6 @@ from transientcam_moments.comparisons import (
     _dorrington,
     _frequency_domain,
     _godbaz,
-    _high_frequency,
     _inverse_fourier,
     _logarithmic,
     _matching_pursuit,
@@ -56,11 +55,11 @@ TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
     for technique in (
         _own.MAXIMUM_ENTROPY, _own.PISARENKO, _own.LIKELIHOOD, _own.MERGED,
-        _single_frequency.TECHNIQUE, _inverse_fourier.TECHNIQUE, _godbaz.TECHNIQUE,
+        _single_frequency.SINGLE_FREQUENCY, _inverse_fourier.TECHNIQUE, _godbaz.TECHNIQUE,
         _spumic.TECHNIQUE, _sra.TECHNIQUE, _sra_table.TECHNIQUE, _matrix_pencil.TECHNIQUE,
         _matching_pursuit.TECHNIQUE, _dorrington.TECHNIQUE, _regularised.TECHNIQUE,
         _coded.TECHNIQUE, _frequency_domain.TECHNIQUE, _logarithmic.TECHNIQUE,
-        _high_frequency.TECHNIQUE,
+        _single_frequency.HIGH_FREQUENCY,
     )
 }  # fmt: skip
 """Every technique by its name; the paper's first."""

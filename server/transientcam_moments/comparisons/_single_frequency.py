@@ -1,4 +1,4 @@
-"""One return from one frequency, as any AMCW lidar camera takes it."""
+"""One return from a phase: of one frequency, as any AMCW lidar camera takes it, or of high ones."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def single_frequency(b: Array) -> SparseEstimate:
     return pixels.sparse(np.angle(first), np.abs(first))
 
 
-TECHNIQUE = Technique(
+SINGLE_FREQUENCY = Technique(
     name="single-frequency",
     label="single frequency",
     returns="1",
@@ -27,4 +27,37 @@ TECHNIQUE = Technique(
     failure="Light on other ways pulls the phase towards itself: the range is too long under "
     "indirect light, and nothing says so.",
     estimate=single_frequency,
+)
+
+
+_LEAST = 2
+
+
+def high_frequency(b: Array) -> SparseEstimate:
+    """Estimate one return, of weight |b_m|, from b_{m-1} and b_m, m >= 2.
+
+    The beat of the two, arg(b_m conj(b_{m-1})), has no ambiguity within the turn and chooses among
+    the m phases that b_m alone allows; it may be off by pi / m. The frequencies are high where
+    m f is above the bandwidth of the indirect light.
+    """
+    pixels = pixels_of(b, least=_LEAST, name="high-frequency", first=-2)
+    m, low, high = pixels.m, pixels.b[-2], pixels.b[-1]
+    beat = np.angle(high * low.conj())
+    turns = np.round((m * beat - np.angle(high)) / (2 * np.pi))
+    phase = (np.angle(high) + 2 * np.pi * turns) / m
+    return pixels.sparse(phase[None], np.abs(high)[None])
+
+
+HIGH_FREQUENCY = Technique(
+    name="high-frequency",
+    label="after Gupta et al. 2015 (high-frequency phase)",
+    returns="1",
+    frequencies="(m - 1) f, m f",
+    harmonics=lambda m: (m - 1, m),
+    least_harmonics=_LEAST,
+    assumptions="Indirect light is smooth over time, so that it has nothing at these frequencies.",
+    cost="Two arctangents.",
+    failure="A mirror's return does not cancel: it pulls the phase by up to its share, and where "
+    "it is strong the wrong period is chosen.",
+    estimate=high_frequency,
 )

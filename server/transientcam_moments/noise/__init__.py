@@ -21,11 +21,12 @@ from transientcam_moments.noise._ambient import ambient_light
 from transientcam_moments.noise._assumed import ASSUMED_NOISE, free_of_scale
 from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
 from transientcam_moments.noise._density import density_std
-from transientcam_moments.noise._draws import draw
 from transientcam_moments.noise._moments import (
     MomentNoise,
+    draw,
     moment_noise,
     own_share,
+    scatter,
     smoothed,
     smoothed_at,
     smoothed_of,
@@ -34,7 +35,6 @@ from transientcam_moments.noise._moments import (
 from transientcam_moments.noise._neighbours import Averaged, average_neighbours
 from transientcam_moments.noise._of_images import CapturedImages, image_noise
 from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
-from transientcam_moments.noise._scatter import scatter
 from transientcam_moments.noise._sensor import ROUNDING_VARIANCE, ImageNoise, Sensor
 from transientcam_moments.noise._still import MOST_FRAMES, Still, average_frames
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from transientcam.cli.options import TokenOption, require_suffix
-from transientcam.cli.terminal import echo, progress_bars
+from transientcam.cli.terminal import Terminal, echo, progress_bars
 from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
@@ -113,10 +113,8 @@ def calibrate(
     With --noise it is the noise of the sensor, before a still scene with dark and bright parts.
     """
     if noise:
-        from transientcam_server.cli.calibrate_noise import measure_noise
-
         _refuse({"URL": url}, "--noise needs the camera itself: end the daemon first")
-        measure_noise(camera or "usb", takes, output, as_json=as_json)
+        _measure_noise(camera or "usb", takes, output, as_json=as_json)
         return
     require_suffix(output, ".npz")
     if lens or beam:
@@ -417,3 +415,20 @@ def _print_measured(result: dict[str, Any]) -> None:
     if result["file"] is not None:
         lines.append(f"  downloaded into {result['file']}")
     echo("\n".join(lines))
+
+
+def _measure_noise(spec: str, frames: int, output: Path | None, *, as_json: bool) -> None:
+    """Measure by photon transfer; print the figures of EMVA 1288, and settings for `serve`."""
+    from transientcam_driver import open_camera
+    from transientcam_server.camera import measure_photon_transfer
+    from transientcam_server.settings import SensorSettings
+
+    with open_camera(spec) as camera, Terminal(stderr=True).status("capturing"):
+        document = measure_photon_transfer(camera, frames=frames).to_document()
+    figures = [f"# {name} = {value:.4g}" for name, value in document["emva1288"].items()]
+    sensor = [f"{name} = {document['sensor'][name]:.6g}" for name in SensorSettings.model_fields]
+    text = json.dumps(document) if as_json else "\n".join([*figures, "[sensor]", *sensor])
+    if output is None:
+        echo(text)
+    else:
+        output.write_text(text + "\n")

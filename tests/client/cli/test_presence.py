@@ -5,7 +5,7 @@ from datetime import datetime
 
 import pytest
 
-from transientcam.cli.presence import MISSED, Presence, watch
+from transientcam.cli.devices import MISSED, Presence, print_changes
 from transientcam.discovery import FoundCamera
 
 BENCH = FoundCamera("bench", "http://192.168.1.20:8000", "TC-0007", "1.0", "v1", tls=False)
@@ -38,7 +38,7 @@ def test_each_change_is_a_line(capsys: pytest.CaptureFixture[str], as_json: bool
             raise KeyboardInterrupt from None
 
     with pytest.raises(KeyboardInterrupt):
-        watch(search, now=lambda: datetime(2026, 11, 22, 9, 14, 3), as_json=as_json)
+        print_changes(search, now=lambda: datetime(2026, 11, 22, 9, 14, 3), as_json=as_json)
     (line,) = capsys.readouterr().out.splitlines()
     if as_json:
         assert line.startswith('{"time": "2026-11-22 09:14:03", "change": "here", "name": "bench"')

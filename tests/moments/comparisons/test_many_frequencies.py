@@ -7,10 +7,9 @@ import transientcam_moments as tm
 from tests.moments import oracles
 from transientcam_moments.comparisons import grid_rad
 from transientcam_moments.comparisons._frequency_domain import frequency_domain
-from transientcam_moments.comparisons._high_frequency import high_frequency
 from transientcam_moments.comparisons._inverse_fourier import inverse_fourier
 from transientcam_moments.comparisons._matching_pursuit import matching_pursuit
-from transientcam_moments.comparisons._single_frequency import single_frequency
+from transientcam_moments.comparisons._single_frequency import high_frequency, single_frequency
 
 # -- inverse Fourier ------------------------------------------------------------------------------
 

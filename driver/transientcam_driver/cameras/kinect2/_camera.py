@@ -5,15 +5,38 @@ from typing import Any
 
 from transientcam_driver.camera import AppliedSequence, FactoryCalibration, RawFrame
 from transientcam_driver.cameras.kinect2._abilities import capabilities_of
-from transientcam_driver.cameras.kinect2._device import Kinect2
+from transientcam_driver.cameras.kinect2._commands import COMPLETION_BYTES
+from transientcam_driver.cameras.kinect2._device import (
+    READY_EVERY_S,
+    READY_TRIES,
+    STOP_REQUESTS,
+    Kinect2,
+)
 from transientcam_driver.cameras.kinect2._frame_queue import Arrival, FrameQueue
 from transientcam_driver.cameras.kinect2._frames import FrameMaker
-from transientcam_driver.cameras.kinect2._off_switch import off_switch
 from transientcam_driver.cameras.kinect2._parameters import DepthParameters, Rows
 from transientcam_driver.cameras.kinect2._tables import P0Tables
+from transientcam_driver.cameras.kinect2._usb_link import (
+    ANSWERS,
+    COMMANDS,
+    CONTROL,
+    FUNCTION_SUSPEND,
+    SET_FEATURE,
+    STREAM,
+    SUSPEND_AND_WAKE,
+    TO_INTERFACE,
+)
 from transientcam_driver.cameras.streamed import StreamedCamera
 from transientcam_driver.errors import CameraError, CameraLost
-from transientcam_supervisor import OffSwitch
+from transientcam_supervisor import (
+    OffSwitch,
+    Step,
+    UsbClaim,
+    UsbControl,
+    UsbRead,
+    UsbSetting,
+    UsbWrite,
+)
 
 
 class Kinect2Camera(StreamedCamera[Kinect2, Arrival]):
@@ -84,3 +107,22 @@ class Kinect2Camera(StreamedCamera[Kinect2, Arrival]):
     def _silence(self) -> str:
         torn = self.counters.resyncs
         return f"{torn} pieces of images" if torn else "nothing"
+
+
+def off_switch(node: str) -> OffSwitch:
+    """Return it for the camera at a device node.
+
+    Commands go over an endpoint, whose interface has to be taken from the owner. Whether a reset of
+    the port switches the light off is not known, so that none is asked for.
+    """
+    commands: list[Step] = []
+    for number, request in enumerate(STOP_REQUESTS):
+        commands += UsbWrite(COMMANDS, request.pack(number)), UsbRead(ANSWERS, COMPLETION_BYTES)
+    steps = (
+        UsbClaim(CONTROL),
+        UsbClaim(STREAM),
+        UsbSetting(STREAM, 0),
+        *commands,
+        UsbControl(TO_INTERFACE, SET_FEATURE, FUNCTION_SUSPEND, SUSPEND_AND_WAKE),
+    )
+    return OffSwitch(node, steps, start_s=READY_TRIES * READY_EVERY_S)

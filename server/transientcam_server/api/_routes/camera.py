@@ -15,8 +15,11 @@ from transientcam_driver.cli.doctor import checks
 from transientcam_server.api._auth import Role
 from transientcam_server.api._auth.permissions import needs
 from transientcam_server.api._dependencies import ServiceOf
-from transientcam_server.api._documents.camera import CameraDocument
-from transientcam_server.api._documents.choices import CameraChangeDocument, CameraChoicesDocument
+from transientcam_server.api._documents.camera import (
+    CameraChangeDocument,
+    CameraChoicesDocument,
+    CameraDocument,
+)
 from transientcam_server.api._problems import documented
 from transientcam_server.api._shared_answer import SharedAnswer
 from transientcam_server.errors import kinds

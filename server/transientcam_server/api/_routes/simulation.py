@@ -8,8 +8,8 @@ from fastapi import APIRouter, Request
 
 from transientcam_driver import SceneInfo, Simulation, list_scenes
 from transientcam_server.api._dependencies import ServiceOf
-from transientcam_server.api._documents.explain import ExplanationDocument
 from transientcam_server.api._documents.simulation import (
+    ExplanationDocument,
     FaultRequest,
     SimulationDocument,
     SimulationRequest,
