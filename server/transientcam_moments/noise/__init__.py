@@ -18,12 +18,13 @@ from transientcam_moments.noise import (
     _neighbours as neighbours,
 )
 from transientcam_moments.noise._ambient import ambient_light
-from transientcam_moments.noise._assumed import ASSUMED_NOISE, free_of_scale
 from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
 from transientcam_moments.noise._density import density_std
 from transientcam_moments.noise._moments import (
+    ASSUMED_NOISE,
     MomentNoise,
     draw,
+    free_of_scale,
     moment_noise,
     own_share,
     scatter,

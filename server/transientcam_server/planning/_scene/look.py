@@ -112,7 +112,10 @@ class _FrameSums:
             scatter=np.maximum(around, 0.0) / max(self._frames - 1, 1),
             temperature_c=self._temperature_c,
             single=self._single / self._frames,
-            mean_dn=self._sum_dn / self._images - sensor.dark_dn,
+            # of differences of two taps the mean is nothing, and noise still that of all light
+            mean_dn=np.maximum(
+                self._sum_dn / self._images - sensor.dark_dn, np.abs(mean[1:]).max(axis=0) / 2
+            ),
             highest_dn=self._highest_dn - sensor.dark_dn,
             usable=self._highest_dn < sensor.highest_dn,
         )

@@ -181,3 +181,12 @@ def test_what_moves_is_not_taken_for_what_is_far(tmp_path: Any) -> None:
     assert scene.direct_m.min() > 1.9
     assert scene.direct_m.max() < 2.4
     assert scene.swing_m_per_s is not None
+
+
+def test_a_wall_stands_still_before_two_taps_whose_difference_is_read() -> None:
+    # light that both taps collect is in no image, and its noise is in all of them
+    with open_camera("tofcam660:emulated?scene=wall") as camera:
+        planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        scene = planner.look(camera, Sequence())
+
+    assert scene.moving_share < 0.01
