@@ -91,9 +91,8 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         self._clocks_s = 0.0, 0.0  # of the device and of this machine, at its last frame
         # `receive` has a thread of its own, which is left behind where it hangs
         limits_s = {"start": SLOW_S, "receive": math.inf}
-        super().__init__(
-            same(connect, lambda device: device.description.serial, **limits_s), **others
-        )
+        connected = same(connect, lambda device: device.description.serial, limits_s=limits_s)
+        super().__init__(connected, **others)
 
     def _describe(self) -> None:
         about = self._device.description

@@ -51,16 +51,22 @@ _T = TypeVar("_T")
 
 
 def same(
-    connect: Callable[[], _D], serial_of: Callable[[_D], str], **limits_s: float
+    connect: Callable[[], _D],
+    serial_of: Callable[[_D], str],
+    simulation: Simulation | None = None,
+    limits_s: Mapping[str, float] | None = None,
 ) -> Callable[[str | None], _D]:
     """Return what connects a plug-in's device, whose calls then end (`within`).
 
     It raises CameraNotFound where the serial number is another one. ``limits_s``: of calls by their
-    names, other than `HANGS_S`.
+    names, other than `HANGS_S`. A simulated device takes as long as it is computed.
     """
 
     def again(serial: str | None) -> _D:
-        device = cast("_D", _Bounded(within(SLOW_S, "connect", connect), limits_s))
+        if simulation is not None:
+            device = connect()
+        else:
+            device = cast("_D", _Bounded(within(SLOW_S, "connect", connect), limits_s or {}))
         if serial in (None, serial_of(device)):
             return device
         device.close()

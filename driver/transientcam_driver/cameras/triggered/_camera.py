@@ -108,7 +108,7 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
         self._number = self._losses = self._lost = 0
         clock = clock or RealClock()
         super().__init__(
-            same(connect, lambda device: device.capabilities.serial),
+            same(connect, lambda device: device.capabilities.serial, simulation),
             clock=clock,
             simulation=simulation,
             silence_s=math.inf,

@@ -13,6 +13,7 @@ from transientcam_driver import (
     ImagesLost,
     TriggeredCamera,
 )
+from transientcam_driver.camera import Simulation
 from transientcam_driver.clock import VirtualClock
 from transientcam_supervisor import OffSwitch
 
@@ -55,8 +56,10 @@ class Cable:
     asked: list[tuple[int, float]] = field(default_factory=list)
     """Harmonic and time of each exposure."""
 
-    def camera(self) -> TriggeredCamera:
-        return TriggeredCamera(lambda: ScriptedDevice(self), clock=self.clock)
+    def camera(self, simulation: Simulation | None = None) -> TriggeredCamera:
+        return TriggeredCamera(
+            lambda: ScriptedDevice(self), clock=self.clock, simulation=simulation
+        )
 
 
 class ScriptedDevice:

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,11 +15,12 @@ from transientcam_driver import (
     Extrinsics,
     FactoryCalibration,
     FrameTimeout,
+    ImageLabel,
     NotStreaming,
     Sequence,
     SubPhases,
 )
-from transientcam_driver.camera import CameraState
+from transientcam_driver.camera import CameraState, Simulation
 from transientcam_driver.cameras.streamed import _camera as streamed
 from transientcam_driver.clock import VirtualClock
 
@@ -205,6 +207,24 @@ def test_a_call_that_hangs_is_left_behind_and_the_camera_comes_back(
                 camera.status()
         ends.set()
         camera.reconnect()
+        camera.start()
+        assert camera.read_frame().images.shape
+
+
+def test_a_simulated_device_takes_as_long_as_it_is_computed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # a busy machine, or a scene of many surfaces: no plug-in hangs
+    prepare = ScriptedDevice.prepare
+
+    def slowly(self: ScriptedDevice, labels: tuple[ImageLabel, ...]) -> float:
+        threading.Event().wait(0.2)
+        return prepare(self, labels)
+
+    monkeypatch.setattr(streamed, "HANGS_S", 0.02)
+    monkeypatch.setattr(ScriptedDevice, "prepare", slowly)
+    simulation = mock.create_autospec(Simulation, instance=True)
+    with Cable().camera(simulation) as camera:
         camera.start()
         assert camera.read_frame().images.shape
 
