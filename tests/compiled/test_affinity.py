@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from transientcam_compiled._affinity import ThreadsApart
+from transientcam_compiled._spread import ThreadsApart
 
 if not hasattr(os, "sched_setaffinity"):
     pytest.skip("the system does not let threads be placed", allow_module_level=True)

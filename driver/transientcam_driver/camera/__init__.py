@@ -5,7 +5,7 @@ Programs use a `Camera`. `Status`, `RawFrame` and `Counters` are plain values of
 `CameraPlugin`; `open_camera` opens a camera by its name.
 """
 
-from transientcam_driver.camera._camera import Camera, CameraState
+from transientcam_driver.camera._camera import Camera, CameraState, has_light, light_warning
 from transientcam_driver.camera._capabilities import (
     IMAGE_HEADER_BYTES,
     AppliedSequence,
@@ -15,7 +15,6 @@ from transientcam_driver.camera._capture_clock import CaptureClock, capture_time
 from transientcam_driver.camera._factory import Extrinsics, FactoryCalibration, Lamp, Lens
 from transientcam_driver.camera._frame import Counters, Hop, RawFrame
 from transientcam_driver.camera._host_camera import HostCamera
-from transientcam_driver.camera._light import has_light, light_warning
 from transientcam_driver.camera._opening import check_camera, kinds, open_camera, plugin_of
 from transientcam_driver.camera._plugged import Plugged, SameDevice, listed, place_on
 from transientcam_driver.camera._plugin import CameraName, CameraPlugin, FoundCamera

@@ -1,4 +1,3 @@
 """From light to raw images: exposure, the sensor, its noise and its converter."""
 
-from transientcam_simulation.imaging._switchable_world import SwitchableWorld
-from transientcam_simulation.imaging._world import World
+from transientcam_simulation.imaging._world import SwitchableWorld, World

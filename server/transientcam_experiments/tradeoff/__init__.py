@@ -9,5 +9,5 @@ page of the results so far.
 from transientcam_experiments.tradeoff.comparing import SCENES, Compared, compare, draw, rivals
 from transientcam_experiments.tradeoff.grid import Grid, load_grid
 from transientcam_experiments.tradeoff.measuring import Point, camera_before, measure, points_of
+from transientcam_experiments.tradeoff.page import file_name, report
 from transientcam_experiments.tradeoff.records import Record, Records
-from transientcam_experiments.tradeoff.report import file_name, report

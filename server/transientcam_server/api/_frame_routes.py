@@ -5,8 +5,7 @@ from typing import Annotated, Final, Protocol
 
 from fastapi import APIRouter, Depends, Query, Response
 
-from transientcam_server.api._documents.frame import FrameDocument
-from transientcam_server.api._documents.pixel import PixelDocument
+from transientcam_server.api._documents.frame import FrameDocument, PixelDocument
 from transientcam_server.api._frame_query import (
     CSV_RESPONSES,
     PRODUCT_PROBLEMS,

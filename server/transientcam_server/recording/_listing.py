@@ -1,9 +1,14 @@
 """Which of many recordings are asked for: by words, by a tag, in an order, a page at a time."""
 
 import json
+import re
+import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from datetime import datetime
 from typing import Any, Final, Literal
+
+from transientcam_server.recording._layout import SUFFIX
 
 Order = Literal["-started_s", "started_s", "name", "-size_bytes", "-duration_s", "-frames"]
 """By a field of the description; ``-`` puts the newest or largest first."""
@@ -59,3 +64,24 @@ def _key(value: Any) -> Any:
 def _text(described: Mapping[str, Any]) -> str:
     fields = [described[name] for name in _SEARCHED]
     return json.dumps(fields, ensure_ascii=False, separators=(" ", " ")).casefold()
+
+
+_UNNAMED: Final = "Recording of"
+_LONGEST: Final = 80
+
+
+def default_name(moment: datetime) -> str:
+    """Return the name of a recording that was given none, by the moment it began (UTC)."""
+    return f"{_UNNAMED} {moment:%Y-%m-%d %H:%M:%S} UTC"
+
+
+def download_name(name: str, recording_id: str) -> str:
+    """Return the name of a downloaded file: what the recording is called, and its id.
+
+    Letters, digits, dots and underscores of ASCII are kept, of a name's first 80; an id says
+    already when a recording began, so a name that says no more is left out.
+    """
+    called = "recording" if name.startswith(_UNNAMED) else name
+    plain = unicodedata.normalize("NFKD", called).encode("ascii", "ignore").decode()
+    words = re.sub(r"[^A-Za-z0-9._]+", "-", plain)[:_LONGEST].strip("-.")
+    return "-".join(filter(None, (words, recording_id))) + SUFFIX

@@ -11,7 +11,7 @@ MIB = 2**20
 PROGRAM = """
 import ctypes, sys
 from pathlib import Path
-from transientcam_server.daemon._memory import give_back_large_blocks
+from transientcam_server.daemon._server import give_back_large_blocks
 
 libc = ctypes.CDLL(None)
 libc.malloc.restype = ctypes.c_void_p

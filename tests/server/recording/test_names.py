@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from transientcam_server.recording._names import default_name, download_name
+from transientcam_server.recording._listing import default_name, download_name
 
 
 def test_a_recording_without_a_name_is_called_by_the_moment_it_began() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from transientcam_server.api._documents.product_stores import ProductStoresDocument
+from transientcam_server.api._documents.recording import ProductStoresDocument
 from transientcam_server.recording import ProductStores
 
 GOOD: dict[str, Any] = {

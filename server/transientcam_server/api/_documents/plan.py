@@ -5,9 +5,10 @@ from typing import Annotated, Any, Literal
 from annotated_types import Len
 from pydantic import ConfigDict, Field
 
-from transientcam_server.api._documents.document import Document, RequestDocument
+from transientcam_server.api._documents.document import Document, JsonInteger, RequestDocument
 from transientcam_server.api._documents.frame import FrameDocument
 from transientcam_server.api._documents.sequence import SequenceDocument
+from transientcam_server.settings import ReconstructionSettings
 
 
 class _StrictDocument(RequestDocument):
@@ -321,3 +322,28 @@ class TradeoffDocument(Document):
     """Of every estimator and set of frequencies on the front: noise falls onto the bias."""
     summary: str
     """From where on bias rules and time buys little, and the best there is, in a sentence."""
+
+
+MAX_SETTINGS = 64
+_EXAMPLE = {"settings": [{"sequence": {"harmonics": 3}}, {"sequence": {"harmonics": 4}}]}
+
+
+class SettingRequest(RequestDocument):
+    """A row of a series; what is absent stays as it is at present."""
+
+    sequence: dict[str, Any] = Field(default_factory=dict)
+    """Fields of `PUT /sequence`."""
+    reconstruction: ReconstructionSettings = ReconstructionSettings()
+    """Fields of `PUT /reconstruction`; frames are not averaged over `still_frames`."""
+
+
+class SeriesRequest(RequestDocument, json_schema_extra={"examples": [_EXAMPLE]}):
+    """What is to be compared."""
+
+    settings: list[SettingRequest] = Field(min_length=1, max_length=MAX_SETTINGS)
+    frames: JsonInteger = Field(default=100, ge=2, le=10_000)
+    """At each setting."""
+    target_m: float | None = Field(default=None, gt=0)
+    """`within_share` is of the ranges that are so close to the truth, or to the plane."""
+    region: RegionOfPixels | None = None
+    """Whose pixels count; null for all."""

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request
 
-from transientcam_server.api._documents.neighbours import NeighboursDocument
+from transientcam_server.api._documents.camera import NeighboursDocument
 from transientcam_server.api._neighbours import NeighbourSearch
 
 router = APIRouter(tags=["info"])

@@ -8,7 +8,7 @@ from fastapi.responses import Response
 
 from transientcam_server.api import _downloads as downloads, _etags as etags
 from transientcam_server.api._dependencies import ServiceOf
-from transientcam_server.api._documents.product_stores import ProductStoresDocument
+from transientcam_server.api._documents.recording import ProductStoresDocument
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.recording import METADATA, ProductStores, is_of_chunk

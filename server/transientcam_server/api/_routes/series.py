@@ -8,7 +8,7 @@ from transientcam_server.api._auth import Role
 from transientcam_server.api._auth.permissions import needs
 from transientcam_server.api._dependencies import OffsOf, ServiceOf
 from transientcam_server.api._documents.job import JobDocument
-from transientcam_server.api._documents.series import SeriesRequest, SettingRequest
+from transientcam_server.api._documents.plan import SeriesRequest, SettingRequest
 from transientcam_server.api._job_answers import ACCEPTED, accepted
 from transientcam_server.api._problems import documented
 from transientcam_server.camera import MAX_VALUES, start_series

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from transientcam import Frame, wire
-from transientcam_server.api._negotiation import negotiate
+from transientcam_server.api._frame_query import negotiate
 from transientcam_server.errors import Problem
 from transientcam_server.imaging import (
     COLOUR_JPEG,
