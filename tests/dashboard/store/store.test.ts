@@ -77,6 +77,13 @@ describe("the player", () => {
     player.seek(0.3);
     player.advance(0.001);
     expect(player.turn.value).toBe(0.4);
+    player.gaps.value = [
+      { first: 0, last: 0.3 },
+      { first: 0.45, last: 1 },
+    ];
+    player.seek(0.46);
+    player.advance(0.001);
+    expect(player.turn.value).toBe(0.3); // over the end, without a dark picture
     [player.playing.value, player.lit.value, player.gaps.value] = [false, null, []];
   });
 

@@ -42,9 +42,11 @@ export class Player {
   advance(elapsed_s: number): boolean {
     if (!this.playing.peek()) return false;
     this.step(elapsed_s * this.speed_ns.peek() * 1e-9);
-    const [lit, turn] = [this.lit.peek(), this.turn.peek()];
-    const gap = this.gaps.peek().find(({ first, last }) => turn >= first && turn < last);
-    if (gap !== undefined) this.turn.value = gap.last % 1;
+    const [lit, turn, gaps] = [this.lit.peek(), this.turn.peek(), this.gaps.peek()];
+    const after = (from: number): number => gaps.find(({ first, last }) => from >= first && from < last)?.last ?? from;
+    // The last gap goes on in the first.
+    const next = after(after(turn) % 1);
+    if (next !== turn) this.turn.value = next;
     else if (lit !== null && (turn < lit.first || turn > lit.last)) this.turn.value = lit.first;
     return true;
   }

@@ -1,4 +1,5 @@
 import { useComputed } from "@preact/signals";
+import { useEffect } from "preact/hooks";
 import { engineering, fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
@@ -16,6 +17,8 @@ import type { Happening } from "../../store/events";
 
 /** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
 export function StatusBar() {
+  const { kiosk } = useStore();
+  if (kiosk.value) return <WallBar />;
   return (
     <header class="bar row">
       <h1 class="brand inline-row">
@@ -32,6 +35,33 @@ export function StatusBar() {
       <Figures />
       <Toasts />
       <Steering />
+      <LightOffButton />
+    </header>
+  );
+}
+
+/** The same on a wall, which is kept from sleeping where the browser can do that. */
+function WallBar() {
+  useEffect(() => {
+    if (window.top !== window) return; // it is for the page around this one to ask
+    let lock: WakeLockSentinel | undefined;
+    // Refused by power saving, say; the lock goes with the page's visibility.
+    const wake = (): void =>
+      void navigator.wakeLock?.request("screen").then(
+        (held) => (lock = held),
+        () => undefined,
+      );
+    wake();
+    document.addEventListener("visibilitychange", wake);
+    return () => {
+      document.removeEventListener("visibilitychange", wake);
+      void lock?.release();
+    };
+  }, []);
+  return (
+    <header class="bar row">
+      <StateChip />
+      <Subject />
       <LightOffButton />
     </header>
   );

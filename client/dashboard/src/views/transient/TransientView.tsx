@@ -64,8 +64,6 @@ export function TransientView() {
   }, [look, filming]);
   return (
     <Panel
-      name="transient"
-      title={<h2>Light</h2>}
       downloads={[
         ...files,
         {
@@ -129,7 +127,7 @@ function partsOf(look: TransientLook, store: Store): FigureParts {
   return {
     ...lightScale(look, store, look.play.peek()),
     title: `${NAMES[look.play.peek()]}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
-    caption: meta === undefined ? "" : captionOf(meta, store.sequence.peek()),
+    caption: meta === undefined ? "" : captionOf(meta, store.sequence.peek(), store.measures.notes),
     colours: look.colours.peek(),
     ground: "black",
   };
