@@ -36,7 +36,7 @@ SECURITY_HEADERS: Final = {
 
 
 class SecurityHeaders:
-    """Adds `SECURITY_HEADERS` to every answer; pages of these origins may hold its pages in frames."""
+    """Adds `SECURITY_HEADERS` to every answer; pages of ``framed_by`` may hold them in frames."""
 
     def __init__(self, app: ASGIApp, *, framed_by: tuple[str, ...] = ()) -> None:
         self._app = app
