@@ -80,6 +80,8 @@ export class Store extends Ground {
   readonly sequencing = new Sequencing(this.api, this.events, this.sequence);
   /** What the camera is and can do; null until it is known. */
   readonly camera = signal<CameraDocument | null>(null);
+  /** The service has none, until one is chosen. */
+  readonly cameraless = computed(() => this.camera.value?.capabilities.model === "none");
   /** A calibration has the camera for itself, so that no frames come. */
   readonly calibrating = computed(
     () => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running",

@@ -73,13 +73,14 @@ type Tone = "good" | "waiting" | "bad" | "quiet";
 type State = Readonly<{ tone: Tone; word: string; why?: string }>;
 
 function StateChip() {
-  const { status, held, replay, calibrating, sequence } = useStore();
+  const { status, held, replay, calibrating, sequence, cameraless } = useStore();
   const now_s = useNow(1);
   const state = useComputed((): State => {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
     if (status.connection.value.kind === "refused") return { tone: "bad", word: "Not let in" };
     if (replay.active.value) return { tone: "quiet", word: "Replay" };
+    if (cameraless.value) return { tone: "quiet", word: "No camera" };
     if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
     if (calibrating.value) return { tone: "waiting", word: "Calibrating" };
     if (status.cameraState.value === "arming") return { tone: "waiting", word: "Light soon", why: "The camera's light is about to go on" };
@@ -141,8 +142,10 @@ function Fault() {
   const mend = (field: string, word: string, remedy: string, long: string, work: () => Promise<unknown>) => (
     <span data-field={field}>
       <Steer title={task.refusal.value ?? long} task={task} onClick={() => void task.run("Applying…", work)}>
-        {word}
-        <span class="wide">: {remedy}</span>
+        <span>
+          {word}
+          <span class="wide">: {remedy}</span>
+        </span>
       </Steer>
     </span>
   );
