@@ -424,7 +424,8 @@ class Settings(_Group):
     allowed_hosts: tuple[str, ...] = ()
     """Names, beside the address listened on, that clients may call this service by."""
     allowed_origins: tuple[str, ...] = ()
-    """Origins of foreign pages that may control the camera, as in ``https://lab.example``."""
+    """Origins of foreign pages that may control the camera, or hold its page in a frame, as in
+    ``https://lab.example``."""
     tls_certificate: Path | None = None
     """A certificate and those it rests on, in PEM; https and wss instead of http and ws."""
     tls_key: Path | None = None

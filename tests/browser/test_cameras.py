@@ -38,6 +38,19 @@ def test_cameras_are_listed_with_links_to_their_dashboards(page: Page, served: S
     expect(page.locator("tbody a")).to_have_attribute("href", BENCH.url)
 
 
+def test_cameras_stand_side_by_side(page: Page, served: Served) -> None:
+    announce(served, replace(BENCH, url=served.url), replace(BENCH, url="javascript:alert(1)"))
+    page.goto("/cameras")
+    expect(page.locator("iframe")).to_have_count(0)
+    page.get_by_role("link", name="maps").click()
+    expect(page.locator("iframe")).to_have_count(1)
+    within = page.frame_locator("iframe")
+    within.locator(".panel-map canvas[data-frame]").wait_for()
+    expect(within.get_by_role("button", name="Light off")).to_be_visible()
+    page.get_by_role("link", name="the list alone").click()
+    expect(page.locator("iframe")).to_have_count(0)
+
+
 def test_what_a_hostile_host_announces_is_text(page: Page, served: Served) -> None:
     hostile = replace(
         BENCH, name=MARKUP, url=f"javascript:{MARKUP}", model=MARKUP, serial=MARKUP, state=""

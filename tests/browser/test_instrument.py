@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import httpx
 import numpy as np
@@ -179,6 +180,13 @@ def test_pins_and_regions_measure_what_the_daemon_serves(page: Page, served: Ser
     assert text(page, ".panel-map", "region-filled") == f"{100 * np.isfinite(inside).mean():.0f} %"
     y, x = np.mgrid[: ranges.shape[0], : ranges.shape[1]]
     plane_is_shown(page, ranges, lens, (x >= 50) & (x <= 69) & (y >= 40) & (y <= 54))
+    note = "edge, 1/2 <b>&amp;"
+    page.get_by_label("Note at B").fill(note)
+    expect(page.locator(".panel-transient .mark-note")).to_have_text(note)
+    with page.expect_download() as download:
+        choose(page, "map", "Figure (SVG)")
+    figure = ElementTree.fromstring(Path(download.value.path()).read_text())
+    assert any(f"B (120, 70): {note}" in (each.text or "") for each in figure.iter())
     # the map along the line between the pins, and all of them in one frame of the last seconds
     choose(page, "sequence", "Values")
     series = page.locator(".plots-place")

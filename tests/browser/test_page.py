@@ -36,15 +36,34 @@ def test_the_address_follows_what_is_shown(page: Page) -> None:
 def test_keys_are_listed_and_do_what_the_list_says(page: Page) -> None:
     open_page(page)
     page.keyboard.press("?")
-    dialog = page.get_by_role("dialog", name="Keys")
+    dialog = page.get_by_role("dialog", name="Help and keys")
     expect(dialog).to_be_visible()
     expect(dialog).to_contain_text("play or pause the light")
     page.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
-    choose_from(page, PAGE_MENU, "Keys (?)")
+    choose_from(page, PAGE_MENU, "Help and keys (?)")
     expect(dialog).to_be_visible()
+    dialog.get_by_label("Search").fill("histogram")
+    expect(dialog.locator("dt")).to_have_text(["Maps"])
     dialog.get_by_role("button", name="Close").click()
     expect(dialog).to_have_count(0)
+    # a tour passes the panels, whatever is shown, and ends
+    page.keyboard.press("f")
+    choose_from(page, PAGE_MENU, "Tour of one minute")
+    for panel in ("transient", "map", "response", "sequence"):
+        toured = page.locator(f"[data-toured={panel}] .panel-{panel}")
+        expect(toured).to_have_css("outline-width", "2px")
+        page.get_by_role("button", name="Next").click()
+    page.get_by_role("button", name="Done").click()
+    expect(page.locator("[data-toured]")).to_have_count(0)
+    # a wall has the pictures and the light's switch, and a link says so
+    page.goto("/#kiosk=on")
+    expect(page.get_by_role("button", name="Light off")).to_be_visible()
+    expect(page.get_by_role("button", name="Hold")).to_have_count(0)
+    page.keyboard.press("k")
+    page.get_by_role("combobox", name="Search a command").fill("wall")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="Hold")).to_be_visible()
     # keys choose maps, layouts and one panel
     page.keyboard.press("4")
     expect(page.get_by_role("tab", name="Brightness", exact=True)).to_have_attribute(

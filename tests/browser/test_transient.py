@@ -278,6 +278,42 @@ def test_it_plays_by_itself_unless_motion_is_unwelcome(page: Page) -> None:
     expect(page.get_by_role("button", name="Pause")).to_be_visible()
 
 
+def test_light_is_seen_in_nearly_all_of_a_pass(page: Page) -> None:
+    open_page(page)
+    shares = page.evaluate(_SHARES_OF_A_PASS)
+    assert len(shares) > 20
+    assert np.mean(np.array(shares) >= 0.01) >= 0.95
+
+
+_SHARES_OF_A_PASS = """
+() => {
+  const { player, light, held } = transientcam.store;
+  [held.value, player.playing.value, player.speed_ns.value] = [true, true, 5];
+  player.turn.value = player.lit.peek().first;
+  const copy = document.createElement("canvas");
+  const shares = [];
+  for (let before = -1; shares.length < 1000; ) {
+    player.advance(1 / 60);
+    if (player.turn.peek() < before) break;
+    before = player.turn.peek();
+    const picture = light.snapshot();
+    [copy.width, copy.height] = [picture.width, picture.height];
+    const context = copy.getContext("2d", { willReadFrequently: true });
+    context.drawImage(picture, 0, 0);
+    const { data } = context.getImageData(0, 0, copy.width, copy.height);
+    let lit = 0;
+    for (let at = 0; at < data.length; at += 4) {
+      const colours = data.slice(at, at + 3);
+      lit += Math.max(...colours) - Math.min(...colours) > 40;
+    }
+    shares.push((4 * lit) / data.length);
+  }
+  player.playing.value = false;
+  return shares;
+}
+"""
+
+
 def test_a_click_shows_the_pixels_impulse_response(page: Page, served: Served) -> None:
     open_page(page)
     shows_frame(page, stop(served))

@@ -4,7 +4,6 @@ import { useEffect } from "preact/hooks";
 
 import { type DialogName, useStore } from "./store/store";
 import { Dialog, type Done } from "./ui/Dialog";
-import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
 import { CameraDialog } from "./views/camera/CameraDialog";
@@ -19,9 +18,11 @@ import { StatusBar } from "./views/status/StatusBar";
 import { TokenDialog } from "./views/status/TokenDialog";
 
 const Examples = later(() => import("./views/examples/Examples"));
+const Help = later<Done>(() => import("./views/palette/Help"));
+const Tour = later<Done>(() => import("./views/examples/Tour"));
 
 const DIALOGS: readonly (readonly [name: DialogName, title: string, inside: ComponentType<Done>])[] = [
-  ["help", "Keys", Help],
+  ["help", "Help and keys", Help],
   ["examples", "Examples", Examples],
   ["palette", "All commands", Palette],
   ["layout", "Layouts", LayoutDialog],
@@ -38,6 +39,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
   useEffect(
     () =>
       effect(() => {
+        document.documentElement.dataset.kiosk = String(store.kiosk.value);
         document.documentElement.dataset.stale = String(store.status.stale.value && !store.replay.active.value);
       }),
     [store],
@@ -53,6 +55,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
           <Inside onDone={close} />
         </Dialog>
       ))}
+      {store.dialog.value === "tour" && <Tour onDone={close} />}
       <FileDrop />
     </>
   );

@@ -130,7 +130,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.add_middleware(Authentication, guard=guard)
     app.add_middleware(OriginCheck, settings=settings)
     app.add_middleware(RequestLog, metrics=metrics)
-    app.add_middleware(SecurityHeaders)
+    app.add_middleware(SecurityHeaders, framed_by=settings.allowed_origins)
     app.add_middleware(RootPath, root_path=settings.root_path)
     _analyse_routes(app)
     return app

@@ -117,14 +117,21 @@ describe("a copied link", () => {
   });
 
   test("says what is shown of pixel and light, pins, a region and the part in sight", async () => {
-    const parts = ["side=cumulative", "light=gate,grey,linear,-2,black", "pins=A30,40/C5,6", "region=50,40/69,54", "sight=4,0.25,0.1"];
+    const NOTE = "a/b, 50 % & <i>#";
+    const parts = [
+      "side=cumulative",
+      "light=gate,grey,linear,-2,black",
+      `pins=A30,40/C5,6,${encodeURIComponent(encodeURIComponent(NOTE))}`,
+      "region=50,40/69,54",
+      "sight=4,0.25,0.1",
+    ];
     const { store, copied, target } = page(`#${parts.join("&")}`);
     const { play, colours, tone, stops, backdrop } = store.light;
     expect(store.settings.of(SIDE).value).toBe("cumulative");
     expect([play, colours, tone, stops, backdrop].map(({ value }) => value)).toEqual(["gate", "grey", "linear", -2, false]);
     expect(store.measures.pins.value).toEqual([
       { name: "A", x: 30, y: 40 },
-      { name: "C", x: 5, y: 6 },
+      { name: "C", x: 5, y: 6, note: NOTE },
     ]);
     expect(store.measures.region.value).toEqual({ x0: 50, y0: 40, x1: 69, y1: 54 });
     expect(store.viewport.view.value).toEqual({ zoom: 4, left: 0.25, top: 0.1 });

@@ -77,6 +77,13 @@ describe("the player", () => {
     player.seek(0.3);
     player.advance(0.001);
     expect(player.turn.value).toBe(0.4);
+    player.gaps.value = [
+      { first: 0, last: 0.3 },
+      { first: 0.45, last: 1 },
+    ];
+    player.seek(0.46);
+    player.advance(0.001);
+    expect(player.turn.value).toBe(0.3); // over the end, without a dark picture
     [player.playing.value, player.lit.value, player.gaps.value] = [false, null, []];
   });
 
@@ -95,15 +102,28 @@ describe("the player", () => {
 
   test("begins at the first arrival of light, unless another time was chosen before", () => {
     const fresh = new Player(period_s);
-    fresh.learn({ first: 0.25, last: 0.5 }, [0.3, 0.4]);
+    fresh.learn({ first: 0.25, last: 0.5 }, [0.3, 0.4], []);
     expect([fresh.turn.value, fresh.lit.value?.first]).toEqual([0.3, 0.25]);
     fresh.seek(0);
-    fresh.learn({ first: 0.25, last: 0.5 }, [0.31]);
+    fresh.learn({ first: 0.25, last: 0.5 }, [0.31], []);
     expect([fresh.turn.value, fresh.arrivals.value]).toEqual([0, [0.31]]);
     const linked = new Player(period_s);
     linked.seek(0.7);
-    linked.learn(null, [0.3]);
+    linked.learn(null, [0.3], []);
     expect(linked.turn.value).toBe(0.7);
+  });
+
+  test("lets a short flight pass slowly enough to be seen, until a speed is chosen", () => {
+    const fresh = new Player(period_s);
+    const learn = (last: number, ...gaps: { first: number; last: number }[]): number => {
+      fresh.learn({ first: 0.25, last }, [0.3], gaps);
+      return fresh.speed_ns.value;
+    };
+    expect(learn(0.5)).toBe(5); // 10 ns in 2 s
+    expect(learn(0.3)).toBe(1); // 2 ns in 2 s
+    expect(learn(0.5, { first: 0.1, last: 0.35 })).toBe(2); // 6 of 10 ns
+    fresh.speed_ns.value = 20;
+    expect(learn(0.3)).toBe(20);
   });
 
   test("steps back over the start to the end", () => {

@@ -11,8 +11,9 @@ export const PIN_NAMES = ["A", "B", "C"] as const;
 export const PIN_COLOURS: Readonly<Record<PinName, string>> = { A: "#e69f00", B: "#56b4e9", C: "#cc79a7" };
 export type PinName = (typeof PIN_NAMES)[number];
 
-/** A pixel that is kept. */
-export type Pin = Pixel & Readonly<{ name: PinName }>;
+/** A pixel that is kept, and what somebody wrote there. */
+export type Pin = Pixel & Readonly<{ name: PinName; note?: string }>;
+export const LONGEST_NOTE = 80;
 
 /** A rectangle of pixels, both corners included; `x0` and `y0` are not larger than `x1` and `y1`. */
 export interface Region {
@@ -35,15 +36,17 @@ export class Measures {
   readonly region: Signal<Region | null>;
 
   constructor(settings: Settings) {
-    // As "A30,40/B120,70".
+    // As "A30,40/B120,70,edge", a note without what would end it.
     this.pins = settings.of<readonly Pin[]>({
       link: "pins",
       initial: [],
-      text: (pins) => pins.map((pin) => pin.name + pixelText(pin)).join("/"),
+      text: (pins) => pins.map((pin) => pin.name + pixelText(pin) + (pin.note ? `,${twice(pin.note)}` : "")).join("/"),
       parse: (text) => {
         const pins = text.split("/").flatMap((each) => {
-          const [name, place] = [PIN_NAMES.find((known) => each.startsWith(known)), pixelOf(each.slice(1))];
-          return name === undefined || place === undefined ? [] : [{ name, ...place }];
+          const [x, y, written = ""] = each.slice(1).split(",");
+          const [name, place] = [PIN_NAMES.find((known) => each.startsWith(known)), pixelOf(`${x},${y}`)];
+          if (name === undefined || place === undefined) return [];
+          return [{ name, ...place, ...(written === "" ? {} : { note: read(written).slice(0, LONGEST_NOTE) }) }];
         });
         return pins.length === 0 ? undefined : pins;
       },
@@ -77,6 +80,16 @@ export class Measures {
     this.pins.value = [...pins.filter((pin) => pin.name !== name), { name, x, y }].sort((a, b) => a.name.localeCompare(b.name));
   }
 
+  /** Writes something at a pin. */
+  annotate(name: PinName, note: string): void {
+    this.pins.value = this.pins.peek().map((pin) => (pin.name === name ? { ...pin, note: note.slice(0, LONGEST_NOTE) } : pin));
+  }
+
+  /** What is written at pins, by their names and pixels. */
+  get notes(): Readonly<Record<string, string>> {
+    return Object.fromEntries(this.pins.value.flatMap((pin) => (pin.note ? [[`${pin.name} (${pin.x}, ${pin.y})`, pin.note]] : [])));
+  }
+
   /** Adds a corner to the polygon, or takes it away where it is one already; a rectangle gives way to a new polygon. */
   corner({ x, y }: Pixel): void {
     const corners = this.region.peek()?.corners ?? [];
@@ -92,6 +105,19 @@ export class Measures {
         { x: Math.max(0, x - REACH), y: Math.max(0, y - REACH) },
         { x: Math.min(width - 1, x + REACH), y: Math.min(height - 1, y + REACH) },
       );
+  }
+}
+
+/** Text in a part of an address, which is read once as a whole. */
+function twice(note: string): string {
+  return encodeURIComponent(encodeURIComponent(note));
+}
+
+function read(text: string): string {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text; // no such text
   }
 }
 

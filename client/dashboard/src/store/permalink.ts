@@ -12,7 +12,7 @@ export async function share(target: Window, store: Store): Promise<void> {
   if (store.replay.active.peek() || frame === undefined) return copyLink(target, store);
   [store.held.value, store.player.playing.value] = [true, false];
   await store.events.reported(async () => {
-    const { id } = await store.recordings.start({ frame, name: `Shared frame ${frame}` });
+    const { id } = await store.recordings.start({ frame, name: `Shared frame ${frame}`, annotations: { ...store.measures.notes } });
     await copyLink(target, store, `recording=${id}&frame=1`);
   });
 }

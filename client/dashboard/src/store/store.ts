@@ -49,7 +49,7 @@ const isMap = (value: unknown): value is string => typeof value === "string" && 
 const A_MAP: Kind<string> = { accepts: isMap, text: String, parse: (text) => (isMap(text) ? text : undefined) };
 
 /** What may be open over the page; one at a time. */
-export type DialogName = "help" | "examples" | "palette" | "layout" | "control" | "camera" | "token";
+export type DialogName = "help" | "tour" | "examples" | "palette" | "layout" | "control" | "camera" | "token";
 
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
 export class Store extends Ground {
@@ -80,6 +80,8 @@ export class Store extends Ground {
   readonly sequencing = new Sequencing(this.api, this.events, this.sequence);
   /** What the camera is and can do; null until it is known. */
   readonly camera = signal<CameraDocument | null>(null);
+  /** The service has none, until one is chosen. */
+  readonly cameraless = computed(() => this.camera.value?.capabilities.model === "none");
   /** A calibration has the camera for itself, so that no frames come. */
   readonly calibrating = computed(
     () => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running",
@@ -120,6 +122,8 @@ export class Store extends Ground {
   /** The one view that is shown alone; null while all are. */
   readonly alone = this.settings.of<string | null>({ link: "view", followed: true, initial: null, ...oneOf<string>(VIEW_NAMES) });
   readonly layout: Signal<Layout> = this.settings.of(LAYOUT);
+  /** A display on a wall: nothing but the pictures, how things stand, and the light's switch. */
+  readonly kiosk = this.settings.of({ link: "kiosk", followed: true, initial: false, ...aBoolean("on", "") });
   readonly layouts = new Layouts(this.settings, this.layout);
   readonly comparison = new Comparison(this.frames, this.rangeErrors, this.settings);
   readonly looks = new Looks(this.frames, this.settings, this.comparison);

@@ -85,6 +85,7 @@ function Pins({ width, height }: SizeProps) {
         return (
           <b key={pin.name} class="mark-pin pin" style={{ left: percent(at.x), top: percent(at.y), "--pin": PIN_COLOURS[pin.name] }}>
             {pin.name}
+            {pin.note && <span class="mark-note">{pin.note}</span>}
           </b>
         );
       })}

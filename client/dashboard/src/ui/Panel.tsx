@@ -7,8 +7,8 @@ import { plotFiles } from "./plotFiles";
 import "./Panel.css";
 
 interface PanelProps {
-  readonly name: string;
-  readonly title: ComponentChildren;
+  /** In place of the view's own title. */
+  readonly title?: ComponentChildren;
   readonly tools?: ComponentChildren;
   /** Files that can be made of what the view shows. */
   readonly downloads?: readonly Action[];
@@ -20,23 +20,27 @@ interface PanelProps {
 /** The type of what is dragged: the name of a view. */
 export const DRAGGED = "application/x-transientcam-view";
 
-/** What a panel may do with its place on the page. */
-export const SlotContext = createContext<readonly ActionGroup[]>([]);
+/** The view of a place by name and title, and what its panel may do there. */
+export const SlotContext = createContext<{ readonly name: string; readonly title: string; readonly groups: readonly ActionGroup[] }>({
+  name: "",
+  title: "",
+  groups: [],
+});
 
 /** The frame around a view: a title, its tools, its content. */
-export function Panel({ name, title, tools, downloads = [], plot, children }: PanelProps) {
-  const slot = useContext(SlotContext);
+export function Panel({ title, tools, downloads = [], plot, children }: PanelProps) {
+  const { name, title: known, groups } = useContext(SlotContext);
   const files = [...(plot === undefined ? [] : plotFiles(name, plot)), ...downloads];
   return (
-    <section class={`panel column panel-${name}`} aria-label={name} data-view={name}>
+    <section class={`panel column panel-${name}`} aria-label={known} data-view={name}>
       <header class="panel-head row apart">
         {/* onto another panel, to change places with it; the menu does the same */}
         <div class="panel-title grow" draggable onDragStart={(event) => event.dataTransfer?.setData(DRAGGED, name)}>
-          {title}
+          {title ?? <h2>{known}</h2>}
         </div>
         <div class="panel-tools wrapped spaced">
           {tools}
-          <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: files }, ...slot]} />
+          <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: files }, ...groups]} />
         </div>
       </header>
       {children}

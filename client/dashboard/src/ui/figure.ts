@@ -41,12 +41,19 @@ export function figureLayout(columns: number, rows: number, wide: number) {
 }
 
 /** What was measured with, in a line, and which pixels were. */
-export function captionOf(meta: FrameMeta | FrameDocument, applied: AppliedDocument | null): string {
+export function captionOf(
+  meta: FrameMeta | FrameDocument,
+  applied: AppliedDocument | null,
+  notes: Readonly<Record<string, string>> = {},
+): string {
   const { harmonics, base_frequency_hz, zeroth, exposure_s, takes, calibration_id, estimator, frame } = meta;
   const measured = multiplesWords(harmonics, applied?.sequence_id === meta.sequence_id ? applied?.sampling : null);
   const sequence = `${measured}, ${engineering(base_frequency_hz, "Hz", 4)}, b₀ ${zeroth.replaceAll("_", " ")}, ${engineering(exposure_s, "s")} × ${takes}`;
+  const written = Object.entries(notes)
+    .map(([place, note]) => `; ${place}: ${note}`)
+    .join("");
   const sent = "decimation" in meta ? sentWords(meta) : "";
-  return `${sequence}; ${estimator}; calibration ${calibration_id || "none"}; frame ${frame}${sent && `, ${sent}`}`;
+  return `${sequence}; ${estimator}; calibration ${calibration_id || "none"}; frame ${frame}${sent && `, ${sent}`}${written}`;
 }
 
 export function figureSvg(figure: Figure, layout: FigureLayout): string {

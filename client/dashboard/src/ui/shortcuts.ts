@@ -77,7 +77,12 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { keys: ["z"], shown: "Z", words: "undo the last change of the layout", withControl: true, run: ({ layouts }) => layouts.undo() },
   { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ dialog }) => (dialog.value = "palette") },
   { keys: ["t"], shown: "T", words: "light, dark, or as the system", run: ({ theme }) => theme.next() },
-  { keys: ["?"], shown: "?", words: "this list", run: ({ dialog }) => (dialog.value = dialog.peek() === "help" ? null : "help") },
+  {
+    keys: ["?"],
+    shown: "?",
+    words: "help: what is shown, and keys",
+    run: ({ dialog }) => (dialog.value = dialog.peek() === "help" ? null : "help"),
+  },
 ];
 
 function nextLayout(store: Store): void {

@@ -114,17 +114,17 @@ function Place({ view, share }: Slot) {
         set(replaced(layout, view, dragged))();
       }}
     >
-      <SlotContext.Provider value={groups}>
-        {obstacle === undefined ? <View /> : <AbsentView name={view} title={shown.title} reason={obstacle} />}
+      <SlotContext.Provider value={{ name: view, title: shown.title, groups }}>
+        {obstacle === undefined ? <View /> : <AbsentView reason={obstacle} />}
       </SlotContext.Provider>
     </div>
   );
 }
 
 /** In the place of a view that this camera's frames have nothing for. */
-function AbsentView({ name, title, reason }: { name: string; title: string; reason: string }) {
+function AbsentView({ reason }: { reason: string }) {
   return (
-    <Panel name={name} title={<h2>{title}</h2>}>
+    <Panel>
       <p class="absent" data-field="absent">
         This camera cannot show it: {reason}.
       </p>

@@ -11,6 +11,7 @@ from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
 from transientcam_server.api._docs import asyncapi
+from transientcam_server.api._middleware.security import SECURITY_HEADERS
 from transientcam_server.errors import Problem, kinds
 
 STATIC: Final = Path(__file__).parents[2] / "static"
@@ -66,8 +67,13 @@ _OWN_FILES: Final = {"cameras.js": "text/javascript", "pages.css": "text/css"}
 
 @router.get("/cameras")
 async def cameras() -> FileResponse:
-    """Show the cameras on the local network; its script asks for them with the tab's token."""
-    return FileResponse(_OWN / "cameras.html", media_type="text/html")
+    """Show the cameras on the local network; its script asks for them with the tab's token.
+
+    Side by side it holds the pages of the others in frames.
+    """
+    policy = f"frame-src http: https:; {SECURITY_HEADERS['Content-Security-Policy']}"
+    headers = {"Content-Security-Policy": policy}
+    return FileResponse(_OWN / "cameras.html", media_type="text/html", headers=headers)
 
 
 @router.get("/cameras/{file}")

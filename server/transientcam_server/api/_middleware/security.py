@@ -20,28 +20,28 @@ MAX_BODY_BYTES: Final = 1024 * 1024
 _SAFE_METHODS = frozenset(("GET", "HEAD", "OPTIONS"))
 _LOOPBACK_NAMES = frozenset(("localhost", "127.0.0.1", "[::1]"))
 _DEFAULT_PORTS = {"http": 80, "https": 443}
-
 SECURITY_HEADERS: Final = {
     # the page's own files and nothing else; blob: for the workers and pictures it makes itself
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
         "font-src 'self'; connect-src 'self'; worker-src 'self' blob:; manifest-src 'self'; "
-        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
     ),
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
 }
 
 
 class SecurityHeaders:
-    """Adds `SECURITY_HEADERS` to every answer."""
+    """Adds `SECURITY_HEADERS` to every answer; pages of ``framed_by`` may hold them in frames."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, *, framed_by: tuple[str, ...] = ()) -> None:
         self._app = app
+        policy = " ".join((SECURITY_HEADERS["Content-Security-Policy"], *framed_by))
+        self._headers = SECURITY_HEADERS | {"Content-Security-Policy": policy}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer with the headers added."""
@@ -49,7 +49,7 @@ class SecurityHeaders:
         async def with_headers(message: Message) -> None:
             if message["type"] in ("http.response.start", "websocket.http.response.start"):
                 headers = MutableHeaders(scope=message)
-                for name, value in SECURITY_HEADERS.items():
+                for name, value in self._headers.items():
                     headers.setdefault(name, value)
             await send(message)
 
@@ -143,7 +143,7 @@ class OriginCheck:
                 kinds.HOST_NOT_ALLOWED, detail, field="Host", value=host, limit=sorted(self._names)
             )
         origin = headers.get("origin", "").lower().rstrip("/")
-        if _is_embedded(headers) and origin not in self._origins:
+        if _is_embedded(headers, framed=bool(self._origins)) and origin not in self._origins:
             detail = "A page of another site may link to this, but not load it."
             site = headers["sec-fetch-site"]
             return Problem(kinds.ORIGIN_NOT_ALLOWED, detail, field="Sec-Fetch-Site", value=site)
@@ -229,10 +229,15 @@ class BodyLimit:
         return Problem(kinds.TOO_LARGE, detail, field="body", limit=self._limit)
 
 
-def _is_embedded(headers: Headers) -> bool:
-    """Whether a page of another site loads this, and no user goes there."""
+def _is_embedded(headers: Headers, *, framed: bool) -> bool:
+    """Whether a page of another site loads this, and no user goes there.
+
+    A frame does not say whose it is: the browser looks that up in the policy's `frame-ancestors`.
+    """
     followed = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
-    return headers.get("sec-fetch-site") == "cross-site" and followed != ("navigate", "document")
+    by_users = ("document", "iframe") if framed else ("document",)
+    visited = followed[0] == "navigate" and followed[1] in by_users
+    return headers.get("sec-fetch-site") == "cross-site" and not visited
 
 
 async def _answer(response: Response, scope: Scope, receive: Receive, send: Send) -> None:

@@ -2,7 +2,7 @@ import asyncio
 
 import httpx
 import pytest
-from starlette.responses import Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 from websockets.exceptions import InvalidStatus
 
@@ -105,6 +105,26 @@ def test_a_page_of_another_site_may_link_here_but_load_nothing(steady: httpx.Cli
     assert status("cross-site", "navigate", "document") == 200
     assert status("same-origin", "no-cors", "image") == 200
     assert status("none", "navigate", "document") == 200
+
+
+def test_pages_of_allowed_origins_may_hold_the_page_in_a_frame() -> None:
+    async def answer(*origins: str) -> httpx.Response:
+        checked = OriginCheck(_page, settings=Settings(allowed_origins=origins))
+        app = httpx.ASGITransport(SecurityHeaders(checked, framed_by=origins))
+        frame = {"Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "iframe"}
+        async with httpx.AsyncClient(transport=app, base_url="http://localhost:8000") as client:
+            return await client.get("/", headers={"Sec-Fetch-Site": "cross-site", **frame})
+
+    allowed, refused = asyncio.run(answer("http://wall.example")), asyncio.run(answer())
+
+    assert (allowed.status_code, refused.status_code) == (200, 403)
+    policies = [each.headers["content-security-policy"] for each in (allowed, refused)]
+    assert policies[0].endswith("; frame-ancestors 'self' http://wall.example")
+    assert policies[1].endswith("; frame-ancestors 'self'")
+
+
+async def _page(scope: Scope, receive: Receive, send: Send) -> None:
+    await PlainTextResponse("page")(scope, receive, send)
 
 
 def test_an_answer_to_another_site_carries_no_leave_to_read_it(steady: httpx.Client) -> None:

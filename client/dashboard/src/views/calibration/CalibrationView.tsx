@@ -26,7 +26,7 @@ export function CalibrationView() {
   const job = calibrations.job.value;
   const outcome = calibrations.outcome.value;
   return (
-    <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
+    <Panel tools={<Import task={task} />}>
       <div class="panel-body column grow fades">
         {job === null ? <MeasureForm task={task} /> : <Measuring job={job} task={task} />}
         <Obstacle />

@@ -8,7 +8,7 @@ export function EventsView() {
   const { events } = useStore();
   const all = [...events.all.value].reverse();
   return (
-    <Panel name="events" title={<h2>What happened</h2>}>
+    <Panel>
       <div class="panel-body column grow fades">
         {all.length === 0 && <p class="quiet recordings-none">Nothing worth telling since the page was opened.</p>}
         <ul class="events fades" tabIndex={0} aria-label="What happened">

@@ -53,7 +53,7 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
     if (meta === undefined) return null;
     return {
       title: look.product.name + compared(),
-      caption: captionOf(meta, store.sequence.peek()),
+      caption: captionOf(meta, store.sequence.peek(), store.measures.notes),
       scale: look.scale.peek(),
       colours: look.colours.peek(),
       unit: shown.unit,
@@ -62,7 +62,6 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
   };
   return (
     <Panel
-      name={name}
       downloads={[
         ...pictureFiles(fileName, () => canvas.current, parts),
         { text: `${look.product.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, picture.peek()) },

@@ -1,6 +1,6 @@
 import { deviation, fixed } from "../../scales/format";
 import type { Look } from "../../store/looks";
-import { PIN_COLOURS, type Pin } from "../../store/measures";
+import { LONGEST_NOTE, PIN_COLOURS, type Pin } from "../../store/measures";
 import { useStore } from "../../store/store";
 import { Remove } from "../../ui/controls";
 import { useProducts } from "../../ui/hooks";
@@ -27,7 +27,16 @@ export function PinsRow({ look }: { look: Look }) {
           <b class="pin" style={{ "--pin": PIN_COLOURS[pin.name] }}>
             {pin.name}
           </b>{" "}
-          {fixed(valueAtPixel(look.frame.value, pin), look.product.decimals, look.product.unit)}
+          {fixed(valueAtPixel(look.frame.value, pin), look.product.decimals, look.product.unit)}{" "}
+          <input
+            type="text"
+            class="pin-note"
+            aria-label={`Note at ${pin.name}`}
+            placeholder="note"
+            maxLength={LONGEST_NOTE}
+            value={pin.note ?? ""}
+            onInput={(event) => measures.annotate(pin.name, event.currentTarget.value)}
+          />
         </span>
       ))}
       {range !== null &&

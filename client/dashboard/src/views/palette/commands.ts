@@ -2,9 +2,8 @@
 import { MAP_PRODUCTS } from "../../store/mapCatalogue";
 import { PAST_S } from "../../store/recordings";
 import type { Store } from "../../store/store";
-import type { ViewName } from "../../store/viewNames";
 import { SHORTCUTS } from "../../ui/shortcuts";
-import { VIEWS } from "../registry";
+import { VIEWS, WORDS } from "../registry";
 import { PRESETS } from "../sequence/presets";
 import { pageActions } from "../status/pageActions";
 
@@ -17,18 +16,6 @@ export interface Command {
   readonly key?: string;
   readonly run: () => void;
 }
-
-/** What people call what the views show. */
-const ALSO: Readonly<Partial<Record<ViewName, string>>> = {
-  map: "distance depth histogram roi region measure",
-  plots: "profile roi region time chart",
-  points: "3d cloud distance measure",
-  sequence: "exposure frequency plan series",
-  validity: "mask invalid flags trust",
-  series: "compare noise bias accuracy frames csv",
-  recordings: "export download hdf5",
-  events: "log messages",
-};
 
 /** Everything that can be done now. What changes the camera is there only while it may be changed from here. */
 export function commandsOf(store: Store): Command[] {
@@ -47,13 +34,14 @@ export function commandsOf(store: Store): Command[] {
     })),
     ...VIEWS.map(({ name, title }) => ({
       words: `Show alone: ${title}`,
-      also: ALSO[name] ?? "",
+      also: WORDS[name],
       run: () => void (store.alone.value = name),
     })),
     ...pageActions(store).flatMap(({ title, actions }) =>
       actions.map(({ text, run }) => ({ words: `${title}: ${text}`, also: text === "Two maps" ? "compare" : "", run })),
     ),
-    { words: "Page: full screen, or not", also: "fullscreen kiosk wall", run: toggleFullScreen },
+    { words: "Page: full screen, or not", also: "fullscreen", run: toggleFullScreen },
+    { words: "Page: display on a wall, or not", also: "kiosk", run: () => void (store.kiosk.value = !store.kiosk.peek()) },
     {
       words: "Panel: save its picture, figure or numbers…",
       also: "screenshot export download csv npy png svg",

@@ -50,7 +50,6 @@ export function PlotsView() {
   };
   return (
     <Panel
-      name="plots"
       plot={words}
       title={
         <h2>

@@ -163,8 +163,6 @@ export function PointsView() {
   const loading = useComputed(() => scene.value === null);
   return (
     <Panel
-      name="points"
-      title={<h2>Points in space</h2>}
       tools={
         <PopoverButton face="Look" label="Look of the points" title="What the points are coloured by, and their size" kind="look">
           <Choice label="Colour by" chosen={colouring} of={COLOURINGS} text={(each) => (each === "light" ? ofLight : NAMES[each])} />
@@ -173,7 +171,7 @@ export function PointsView() {
       }
       downloads={[
         ...pictureFiles(() => `points-${range.peek()?.meta.frame ?? 0}`, snapshot, parts),
-        { text: "Points as shown (CSV)", run: saveShown },
+        { text: "Points as streamed (CSV)", run: saveShown },
         { text: "Points with light and flags (PLY)", run: () => void saveAll() },
       ]}
     >

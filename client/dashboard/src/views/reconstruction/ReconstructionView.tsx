@@ -30,8 +30,6 @@ export function ReconstructionView() {
   };
   return (
     <Panel
-      name="reconstruction"
-      title={<h2>Reconstruction</h2>}
       tools={
         <Steer
           title="Smoothing, bias and all else as the daemon has them by default"

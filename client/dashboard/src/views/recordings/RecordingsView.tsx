@@ -33,8 +33,6 @@ export function RecordingsView() {
   };
   return (
     <Panel
-      name="recordings"
-      title={<h2>Recordings</h2>}
       tools={
         <>
           {known?.free_bytes != null && (

@@ -83,7 +83,6 @@ export function ResponseView() {
   };
   return (
     <Panel
-      name="response"
       downloads={shown.value === null ? [] : files}
       plot={shown.value === null ? undefined : words}
       title={

@@ -23,8 +23,6 @@ export function SequenceView() {
   });
   return (
     <Panel
-      name="sequence"
-      title={<h2>Sequence and accuracy</h2>}
       plot={found === null || editing.value ? undefined : () => words(found.current.meta)}
       downloads={found === null ? [] : [{ text: "Front (CSV)", run: () => saveTable("front", frontTable(accuracy)) }]}
       tools={

@@ -57,7 +57,7 @@ export function SeriesView() {
   };
   const csv = (): void => saveTable(`series-${series.id.value}`, [Object.keys(rows[0]), ...rows.map((row) => Object.values(row))]);
   return (
-    <Panel name="series" title={<h2>Series</h2>} downloads={rows.length === 0 ? [] : [{ text: "Table (CSV)", run: csv }]}>
+    <Panel downloads={rows.length === 0 ? [] : [{ text: "Table (CSV)", run: csv }]}>
       <div class="panel-body column grow fades">
         <Obstacle />
         <Form class="series-form wrapped spaced" onSubmit={start}>

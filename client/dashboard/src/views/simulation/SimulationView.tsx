@@ -21,8 +21,6 @@ export function SimulationView() {
   const explanation = simulation.explanation.value;
   return (
     <Panel
-      name="simulation"
-      title={<h2>Simulated scene</h2>}
       tools={
         world !== null && (
           <>

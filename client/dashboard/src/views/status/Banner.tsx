@@ -9,7 +9,7 @@ import "./Banner.css";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
-  const { api, status, lease, lightOff, camera, dialog } = useStore();
+  const { api, status, lease, lightOff, cameraless, dialog } = useStore();
   const connection = status.connection.value;
   const off = lightOff.state.value;
   if (off !== null && off.kind !== "sent") {
@@ -35,10 +35,10 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     );
   }
   const loss = status.cameraLoss.value;
-  if (loss !== null && camera.value?.capabilities.model === "none" && connection.kind === "open") {
+  if (loss !== null && cameraless.value && connection.kind === "open") {
     return (
       <Alert about="camera" word="Choose a camera" onClick={() => (dialog.value = "camera")}>
-        <strong>No camera.</strong> {sentence(loss.reason ?? "")}
+        <strong>No camera</strong> is chosen yet: a device, or a simulation.
       </Alert>
     );
   }

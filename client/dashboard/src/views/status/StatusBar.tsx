@@ -1,4 +1,5 @@
 import { useComputed } from "@preact/signals";
+import { useEffect } from "preact/hooks";
 import { engineering, fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
@@ -16,6 +17,8 @@ import type { Happening } from "../../store/events";
 
 /** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
 export function StatusBar() {
+  const { kiosk } = useStore();
+  if (kiosk.value) return <WallBar />;
   return (
     <header class="bar row">
       <h1 class="brand inline-row">
@@ -37,19 +40,47 @@ export function StatusBar() {
   );
 }
 
+/** The same on a wall, which is kept from sleeping where the browser can do that. */
+function WallBar() {
+  useEffect(() => {
+    if (window.top !== window) return; // it is for the page around this one to ask
+    let lock: WakeLockSentinel | undefined;
+    // Refused by power saving, say; the lock goes with the page's visibility.
+    const wake = (): void =>
+      void navigator.wakeLock?.request("screen").then(
+        (held) => (lock = held),
+        () => undefined,
+      );
+    wake();
+    document.addEventListener("visibilitychange", wake);
+    return () => {
+      document.removeEventListener("visibilitychange", wake);
+      void lock?.release();
+    };
+  }, []);
+  return (
+    <header class="bar row">
+      <StateChip />
+      <Subject />
+      <LightOffButton />
+    </header>
+  );
+}
+
 /** A class of the style sheet. */
 type Tone = "good" | "waiting" | "bad" | "quiet";
 
 type State = Readonly<{ tone: Tone; word: string; why?: string }>;
 
 function StateChip() {
-  const { status, held, replay, calibrating, sequence } = useStore();
+  const { status, held, replay, calibrating, sequence, cameraless } = useStore();
   const now_s = useNow(1);
   const state = useComputed((): State => {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
     if (status.connection.value.kind === "refused") return { tone: "bad", word: "Not let in" };
     if (replay.active.value) return { tone: "quiet", word: "Replay" };
+    if (cameraless.value) return { tone: "quiet", word: "No camera" };
     if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
     if (calibrating.value) return { tone: "waiting", word: "Calibrating" };
     if (status.cameraState.value === "arming") return { tone: "waiting", word: "Light soon", why: "The camera's light is about to go on" };
@@ -111,8 +142,10 @@ function Fault() {
   const mend = (field: string, word: string, remedy: string, long: string, work: () => Promise<unknown>) => (
     <span data-field={field}>
       <Steer title={task.refusal.value ?? long} task={task} onClick={() => void task.run("Applying…", work)}>
-        {word}
-        <span class="wide">: {remedy}</span>
+        <span>
+          {word}
+          <span class="wide">: {remedy}</span>
+        </span>
       </Steer>
     </span>
   );

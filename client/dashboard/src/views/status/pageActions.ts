@@ -43,7 +43,8 @@ export function pageActions(store: Store): ActionGroup[] {
       actions: [
         { text: "All commands (K)", run: () => (store.dialog.value = "palette") },
         { text: "Examples", run: () => (store.dialog.value = "examples") },
-        { text: "Keys (?)", run: () => (store.dialog.value = "help") },
+        { text: "Tour of one minute", run: () => (store.dialog.value = "tour") },
+        { text: "Help and keys (?)", run: () => (store.dialog.value = "help") },
       ],
     },
     {

@@ -85,7 +85,6 @@ export function StreakView() {
   const name = (): string => `streak-row-${row.peek()}-${frame.peek()?.meta.frame ?? 0}`;
   return (
     <Panel
-      name="streak"
       title={
         <h2>
           Streak <span class="quiet">of row {row.value}</span>

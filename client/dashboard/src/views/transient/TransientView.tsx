@@ -45,10 +45,10 @@ export function TransientView() {
   useDrawing(() => {
     const arrivals = frame.value?.light?.arrivals;
     if (arrivals === undefined) return;
-    player.learn(steady(player.lit.peek(), litOf(arrivals)), peaksOf(arrivals));
     // What is gathered over a time stays in sight.
     const trail = look.play.value === "gate" ? GATE_S / store.period_s.value : 0;
-    player.gaps.value = look.play.value === "cumulative" ? [] : gapsOf(arrivals, trail);
+    const gaps = look.play.value === "cumulative" ? [] : gapsOf(arrivals, trail);
+    player.learn(steady(player.lit.peek(), litOf(arrivals)), peaksOf(arrivals), gaps);
   }, [frame, player]);
   const play = look.play.value;
   const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
@@ -64,8 +64,6 @@ export function TransientView() {
   }, [look, filming]);
   return (
     <Panel
-      name="transient"
-      title={<h2>Light</h2>}
       downloads={[
         ...files,
         {
@@ -129,7 +127,7 @@ function partsOf(look: TransientLook, store: Store): FigureParts {
   return {
     ...lightScale(look, store, look.play.peek()),
     title: `${NAMES[look.play.peek()]}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
-    caption: meta === undefined ? "" : captionOf(meta, store.sequence.peek()),
+    caption: meta === undefined ? "" : captionOf(meta, store.sequence.peek(), store.measures.notes),
     colours: look.colours.peek(),
     ground: "black",
   };

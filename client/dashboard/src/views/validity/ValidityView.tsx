@@ -38,8 +38,6 @@ export function ValidityView() {
   }, [frame, scene, reasons]);
   return (
     <Panel
-      name="validity"
-      title={<h2>Validity</h2>}
       tools={
         <Toggle on={trust} title="Which ranges can be trusted, and why">
           Trust

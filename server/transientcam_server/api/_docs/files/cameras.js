@@ -2,6 +2,11 @@
 const EVERY_MS = 10_000;
 const message = document.querySelector("#message");
 const table = document.querySelector("table");
+const wall = document.querySelector("#wall");
+const MOST_FRAMES = 16;
+let listed = [];
+document.querySelector("#origin").textContent = location.origin;
+addEventListener("hashchange", () => showWall(listed));
 
 /** The dashboard keeps its token on the shelf of the tab. */
 function headers() {
@@ -38,6 +43,25 @@ function row(camera) {
   return found;
 }
 
+/** The pages of all cameras, in frames that can't lead this page away; they stay while the list is the same. */
+function showWall(cameras) {
+  const view = location.hash.slice(1);
+  const urls = cameras.map(({ url }) => url).filter((url) => view && /^https?:/.test(url)).slice(0, MOST_FRAMES);
+  document.querySelector("#framing").hidden = urls.length === 0;
+  if (wall.dataset.shown === [view, ...urls].join(" ")) return;
+  wall.dataset.shown = [view, ...urls].join(" ");
+  wall.replaceChildren(
+    ...urls.map((url) => {
+      const [figure, name, frame] = ["figure", "figcaption", "iframe"].map((each) => document.createElement(each));
+      frame.title = name.textContent = cameras.find((each) => each.url === url).name;
+      frame.sandbox = "allow-scripts allow-same-origin";
+      frame.src = `${url.replace(/[?#].*|\/*$/g, "")}/#view=${encodeURIComponent(view)}&kiosk=on`;
+      figure.append(name, frame);
+      return figure;
+    }),
+  );
+}
+
 function summary({ cameras, left_out, reason }) {
   if (reason !== null) return reason;
   if (cameras.length === 0) return "No camera announces itself on this network.";
@@ -56,6 +80,8 @@ async function refresh() {
     } else {
       message.textContent = summary(found);
       table.tBodies[0].replaceChildren(...found.cameras.map(row));
+      listed = found.cameras;
+      showWall(listed);
     }
     table.hidden = !answer.ok || found.cameras.length === 0;
   } catch {
