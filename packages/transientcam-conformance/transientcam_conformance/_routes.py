@@ -130,8 +130,8 @@ def _answers(device: Device) -> Iterator[tuple[dict[str, Any], httpx.Response]]:
 
     Each is read when it is asked for: what one is found wrong by need not wait for those after it.
     """
-    reads = [each for each in _operations(device) if each[1] == "GET"]
-    for at, (path, method, operation) in enumerate(reads):
+    reads = [(path, told) for path, method, told in _operations(device) if method == "GET"]
+    for at, (path, operation) in enumerate(reads):
         if at == len(device.answers):
             query = {
                 each["name"]: _example(each)
