@@ -17,9 +17,14 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 # The last four, for tests that skip without them, recommended ones left out. Mesa has a software device of Vulkan.
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace nginx-light caddy octave mesa-vulkan-drivers
 
+CHECKS := check-pyright check-mypy check-style check-documents check-dashboard
+
+# Every process would compile all modules anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help install serve test test-fast mutants check bench paper docs docs-site dist lock release clean dashboard debian-packages debian-package-names \
-	check-pyright check-mypy check-style check-documents check-dashboard check-newest simulation-kernels
+	check-pyright check-mypy check-style check-documents check-dashboard check-newest compiled-once
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
@@ -29,7 +34,11 @@ install: .venv/serve.stamp .venv/version.stamp dashboard  ## Install client, ser
 serve: install  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
 	$(BIN)/transientcam serve --host $(HOST) --port $(PORT) --camera '$(CAMERA)'
 
-test: check .venv/version.stamp debian-packages dashboard  ## Run every check and every test
+# What waits for the network first, side by side; and then what computes.
+test:  ## Run every check and every test
+	@$(MAKE) --no-print-directory --jobs 3 .venv/test.stamp debian-packages client/dashboard/node_modules/.package-lock.json
+	@$(MAKE) --no-print-directory .venv/version.stamp
+	@$(MAKE) --no-print-directory --jobs 2 compiled-once $(CHECKS) dashboard
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 # The packages that are arithmetic, without a daemon, a browser, a compiler or a fuzzer.
@@ -39,7 +48,7 @@ test-fast: .venv/test.stamp  ## Run the tests of mathematics, wire format and pl
 		tests/moments tests/client/wire tests/server/planning/prediction tests/server/planning/search/test_pareto.py
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
-	@$(MAKE) --no-print-directory --jobs 2 simulation-kernels check-pyright check-mypy check-style check-documents check-dashboard
+	@$(MAKE) --no-print-directory --jobs 2 $(CHECKS)
 
 mutants: .venv/mutants.stamp  ## Draw random mutants that no test notices (SEED=2 COUNT=20 WHERE='wire lease')
 	$(BIN)/python -m tests.mutants $(SEED) $(COUNT) $(WHERE)
@@ -125,7 +134,7 @@ OURS := -m pip install --quiet --no-deps --no-build-isolation --editable .
 	$(BIN)/python $(LOCKED) --requirement requirements/vendor.txt
 	$(BIN)/python $(LOCKED) --upgrade --target build/lerobot --requirement requirements/lerobot.txt
 	$(BIN)/python $(OURS) $(PACKAGES)
-	@touch $@ .venv/serve.stamp
+	@touch $@ .venv/serve.stamp .venv/version.stamp
 
 # For nothing else, and with much that nothing else needs.
 .venv/mutants.stamp: .venv/test.stamp
@@ -156,9 +165,11 @@ check-newest:  ## Test what uses internals of numba and uvicorn with the newest 
 	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/test_kernels*.py \
 		tests/simulation/light/test_image_kernels.py tests/server/daemon tests/server/api/stream
 
-# Once, before tests in several processes would each compile the same.
-simulation-kernels: .venv/test.stamp
-	$(BIN)/python -c 'import tests.simulation.light.test_compiled, tests.simulation.light.test_held_light'
+# Once, before tests in several processes would each compile the same: the simulation's kernels, and every
+# module of the tests, with their assertions rewritten.
+compiled-once: .venv/test.stamp
+	@mkdir -p build
+	@$(BIN)/python -m pytest --collect-only --quiet >build/collected.txt || { cat build/collected.txt; exit 1; }
 
 # Side by side, the slowest first.
 check-pyright:

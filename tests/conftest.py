@@ -127,15 +127,20 @@ _DAEMONS = {"breakable", "http", "served", "steady", "streaming", "serving", "ur
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests by what they need; begin with the files that take longest."""
+    paths = {item.path for item in items}
+    marks = {
+        path: [mark for folder, mark in _MARKED.items() if path.is_relative_to(ROOT / folder)]
+        for path in paths
+    }
     for item in items:
-        for folder, mark in _MARKED.items():
-            if item.path.is_relative_to(ROOT / folder):
-                item.add_marker(mark)
+        for mark in marks[item.path]:
+            item.add_marker(mark)
         known = {*getattr(item, "fixturenames", ()), *vars(getattr(item, "module", object))}
         if _DAEMONS & known:
             item.add_marker("daemon")
     place = {ROOT / name: at for at, name in enumerate(_LONGEST_FIRST)}
-    items.sort(key=lambda item: place.get(item.path, len(place)))
+    order = {path: place.get(path, len(place)) for path in paths}
+    items.sort(key=lambda item: order[item.path])
 
 
 @pytest.hookimpl(wrapper=True)

@@ -16,6 +16,7 @@ from fastapi import FastAPI
 import transientcam
 from transientcam.opening import remote_recording
 from transientcam.remote_file import RemoteFile
+from transientcam_compiled import ChildProcess
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import Clock
 from transientcam_server import service
@@ -130,6 +131,9 @@ def serving(
         mock.patch.object(acquisition, "STALLED_MIN_S", _PATIENT_S),
         # nor are streams cut at the end before their clients have the reason
         mock.patch.object(service, "_CLOSING_S", _PATIENT_S),
+        # nor does what plans or compiles for it stand back behind all other tests, while the daemon
+        # and its clients go on
+        mock.patch.dict(ChildProcess.__init__.__kwdefaults__, nice=0),
     ):
         usual: dict[str, Any] = {"port": 0, "log_level": "warning", "capture_at_start": True}
         usual |= {"calibrations": {"directory": state}}

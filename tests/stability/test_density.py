@@ -1,11 +1,14 @@
 """Eigenvalue, coefficients and density in the hard cases."""
 
 from collections.abc import Callable, Iterator
+from functools import cache
+from typing import Any
 
 import mpmath as mp
 import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
+from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.stability import exact
@@ -30,6 +33,7 @@ def cases(
     ]
 
 
+@cache
 def share(m: int, precision: str, signal: Signal) -> float:
     """Smallest eigenvalue relative to b_0."""
     b = exact.rounded(signal.moments(m), PRECISIONS[precision])
@@ -49,6 +53,15 @@ def is_definite(m: int, precision: str, signal: Signal) -> bool:
 def has_oracle(m: int, precision: str, signal: Signal) -> bool:
     """Whether the eigenvalue is known, or 60 digits of it don't take too long."""
     return len(signal.phase) <= m or m <= 8
+
+
+@cache
+def light_of_sparse_signals(m: int, precision: str) -> dict[str, NDArray[Any]]:
+    """Return the light up to nine phases, of all signals at once, which takes as long as of one."""
+    signals = list(sparse_signals(m))
+    pixels = [exact.rounded(each.moments(m), PRECISIONS[precision]) for each in signals]
+    light = tm.cumulative(tm.levinson(np.stack(pixels, axis=1)), np.linspace(0, 2 * np.pi, 9))
+    return {each.name: light[:, at] for at, each in enumerate(signals)}
 
 
 SPARSE = cases(sparse_signals)
@@ -133,7 +146,7 @@ def test_the_density_of_a_sparse_signal_is_finite_and_its_light_at_the_returns(
 
     c = tm.levinson(b)
     h = tm.density(c, np.array([*signal.phase, between], float))
-    light = tm.cumulative(c, np.linspace(0, 2 * np.pi, 9))
+    light = light_of_sparse_signals(m, precision)[signal.name]
 
     if signal.uniform == 0:
         assert tm.flags(b) == tm.Flags.DEGENERATE

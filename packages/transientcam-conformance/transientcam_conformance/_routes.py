@@ -125,12 +125,14 @@ def _operations(device: Device) -> Iterator[tuple[str, str, dict[str, Any]]]:
                 yield path, method.upper(), operation
 
 
-def _answers(device: Device) -> list[tuple[dict[str, Any], httpx.Response]]:
-    """Read every route there is, once, each with the example that its description gives."""
-    if not device.answers:
-        for path, method, operation in _operations(device):
-            if method != "GET":
-                continue
+def _answers(device: Device) -> Iterator[tuple[dict[str, Any], httpx.Response]]:
+    """Read every route there is, once, each with the example that its description gives.
+
+    Each is read when it is asked for: what one is found wrong by need not wait for those after it.
+    """
+    reads = [(path, told) for path, method, told in _operations(device) if method == "GET"]
+    for at, (path, operation) in enumerate(reads):
+        if at == len(device.answers):
             query = {
                 each["name"]: _example(each)
                 for each in operation.get("parameters", ())
@@ -140,7 +142,7 @@ def _answers(device: Device) -> list[tuple[dict[str, Any], httpx.Response]]:
             timeout_s = _READ_TIMEOUTS * device.timeout_s
             response = device.peek(_concrete(path, operation), params=query, timeout=timeout_s)
             device.answers.append((operation, response))
-    return device.answers
+        yield device.answers[at]
 
 
 def _concrete(path: str, operation: Mapping[str, Any]) -> str:

@@ -108,13 +108,13 @@ def test_a_gain_that_falls_with_frequency_changes_nothing() -> None:
 
 
 def test_the_compiled_pass_finds_the_same_pixels() -> None:
-    raw = captured(halves(0.0, 400.0), "estimated")
+    raw = captured(halves(0.0, 400.0), "estimated", m=3)  # whose pass other tests compile, too
     stated = settings("pisarenko", "estimated")
-    of_numpy = tm.reconstruct(raw, stated, calibration=np.ones(5))
+    of_numpy = tm.reconstruct(raw, stated, calibration=np.ones(4))
     expected = np.array(of_numpy.has_range)
 
-    with kernels(4, precisions=("float32",), names=("reconstruct",)):
-        compiled = tm.reconstruct(raw, stated, calibration=np.ones(5))
+    with kernels(3, precisions=("float32",), names=("reconstruct",)):
+        compiled = tm.reconstruct(raw, stated, calibration=np.ones(4))
         np.testing.assert_array_equal(np.isfinite(compiled.range_m), compiled.has_range)
 
     assert (compiled.has_range != expected).mean() < 0.001  # rounded at the limit

@@ -25,10 +25,11 @@ from tests.server.recording.made import APPLIED, assert_same, frame, header
 from transientcam_server.recording import Recording, RecordingWriter, _layout as layout, recover
 from transientcam_server.recording._recorder import Limits, Recorder
 
-FRAMES: Final = 20
+FRAMES: Final = 10
 FAULTS: Final = ("EIO", "ENOSPC", "short")
 CALLS: Final = ("write", "pwrite", "fsync", "ftruncate")
 _FRAMES: Final = [frame(number) for number in range(FRAMES)]
+_HEADER: Final = header()
 _IMAGES: Final[dict[str, bytes]] = {}
 _MADE: Final = layout.image
 
@@ -82,8 +83,8 @@ def record(directory: Path) -> Recorder:
     """Record `FRAMES`, brought to the disk every few of them; an OSError if it cannot begin."""
     ticks = itertools.count()
     recorder = Recorder(
-        RecordingWriter(directory / "a.h5", header()),
-        header(),
+        RecordingWriter(directory / "a.h5", _HEADER),
+        _HEADER,
         limits=Limits(),
         queue_frames=FRAMES,
         free_bytes=lambda: 1 << 40,
