@@ -104,6 +104,51 @@ class Metrics:
         return prometheus.generate_latest(self.registry)
 
 
+_SERIES: Final = """\
+gauge | device_connected | | Whether the camera answers.
+gauge | acquisition_running | | Whether frames are being captured.
+counter | device_losses | | How often the camera was lost.
+counter | device_reconnects | | How often a lost camera came back.
+counter | images | result | Images from the camera, by what became of them.
+counter | spoilt_images | result | Images unlike the others, of frames that were computed, by what \
+became of them.
+counter | usb_resynchronisations | | How often the beginning of an image had to be searched for.
+counter | frames_captured | | Frames since the service started.
+gauge | frame_age_seconds | | Since the last frame arrived.
+counter | device_results | device | Passes and likelihoods that a GPU was asked for, by what \
+computed them.
+gauge | sensor_temperature_celsius | | Of the camera, with its last frame.
+gauge | pixels_flagged_ratio | flag | Share of the pixels of the last frame that was looked at that carry \
+a flag.
+gauge | history_frames | | Former frames that can still be had.
+gauge | history_bytes | | Memory of their raw images.
+gauge | history_limit_bytes | | What it may be at most.
+gauge | calibration_active | | Whether a measurement calibrates frames, where it fits the sequence.
+gauge | calibration_timestamp_seconds | | When the active calibration was measured.
+gauge | calibration_invalid_pixels_ratio | | Share of pixels whose moments contradict each other \
+by more than noise explains.
+gauge | stream_clients | | Streams open now.
+gauge | preview_clients | | Clients that receive a preview as MJPEG now.
+counter | frames_dropped | | Frames that clients were too slow for, of all clients together.
+gauge | lease_held | | Whether a client holds the lease.
+gauge | recording_active | | Whether frames are being recorded.
+counter | recording_frames | | Frames that were recorded.
+counter | recording_dropped_frames | | Frames that the disk was too slow for.
+counter | recording_bytes | | Bytes that were written.
+counter | recordings_ended | reason | Recordings, by why they ended.
+gauge | disk_waiting_seconds | | How long the disk of the recordings has not answered.
+gauge | recording_disk_free_bytes | | What the disk has left where recordings are kept.
+counter | relay_reconnects | | How often the origin was found again.
+counter | relay_origin_restarts | | How often the origin was started anew meanwhile.
+counter | relay_dropped_frames | | Frames that the origin dropped because relay or network were \
+too slow.
+gauge | relay_hop_latency_seconds | hop | From the arrival of the last frame at the service before \
+to that at the relay, by both clocks; hop 1 is the nearest to the camera.
+counter | relay_hop_missed_frames | hop | Frames that a relay never got of the service before it.
+"""
+"""A line a series: what it does, its name, the label of its values, what it means."""
+
+
 class _ServiceCollector(Collector):
     """Collects what the service counts anyway."""
 
@@ -112,197 +157,91 @@ class _ServiceCollector(Collector):
         self._metrics = metrics
 
     def collect(self) -> Iterator[Metric]:
-        """Return the values of this moment."""
-        yield from self._build()
-        yield from self._device()
-        yield from self._frames()
-        yield from self._history()
-        yield from self._calibration()
-        yield from self._clients()
-        yield from self._recordings()
-        yield from self._relay()
-
-    def _build(self) -> Iterator[Metric]:
+        """Return the values of this moment; no series of what there is not."""
         capabilities = self._service.camera.capabilities
-        versions = {
-            "version": self._service.identity["version"],
-            "api": "v1",
-            "model": capabilities.model,
-            "firmware": capabilities.firmware,
-        }
+        versions = {"version": self._service.identity["version"], "api": "v1"}
+        versions |= {"model": capabilities.model, "firmware": capabilities.firmware}
         yield InfoMetricFamily("transientcam_build", "Versions of what runs here.", value=versions)
+        values = self._of_camera() | self._of_frames() | self._of_clients() | self._of_relay()
+        for line in _SERIES.splitlines():
+            kind, name, label, meaning = (each.strip() for each in line.split("|"))
+            if (value := values.get(name)) is not None:
+                yield _filled(_FAMILIES[kind], f"transientcam_{name}", meaning, value, label)
 
-    def _device(self) -> Iterator[Metric]:
-        state = self._service.acquisition.status().state
-        yield _gauge("device_connected", "Whether the camera answers.", state != "lost")
-        yield _gauge(
-            "acquisition_running", "Whether frames are being captured.", state == "streaming"
-        )
-        yield _counter("device_losses", "How often the camera was lost.", self._metrics.losses)
-        yield _counter(
-            "device_reconnects", "How often a lost camera came back.", self._metrics.reconnects
-        )
-        counters = self._service.camera.counters
-        yield _counter(
-            "images",
-            "Images from the camera, by what became of them.",
-            {"received": counters.images, "lost": counters.lost, "corrupt": counters.corrupt},
-            by="result",
-        )
-        yield _counter(
-            "spoilt_images",
-            "Images unlike the others, of frames that were computed, by what became of them.",
-            self._metrics.corrupt,
-            by="result",
-        )
-        yield _counter(
-            "usb_resynchronisations",
-            "How often the beginning of an image had to be searched for.",
-            counters.resyncs,
-        )
+    def _of_camera(self) -> "_Values":
+        status, counters = self._service.acquisition.status(), self._service.camera.counters
+        images = {"received": counters.images, "lost": counters.lost, "corrupt": counters.corrupt}
+        calibrations, device = self._service.calibrations, tm.kernels.device_state()
+        drift = calibrations.known_drift
+        return {
+            "device_connected": status.state != "lost",
+            "acquisition_running": status.state == "streaming",
+            "device_losses": self._metrics.losses,
+            "device_reconnects": self._metrics.reconnects,
+            "images": images,
+            "spoilt_images": self._metrics.corrupt,
+            "usb_resynchronisations": counters.resyncs,
+            "frames_captured": status.frames,
+            "frame_age_seconds": status.frame_age_s,
+            "device_results": None if device is None else device["results"],
+            "calibration_active": calibrations.active_id != NOMINAL_ID,
+            "calibration_timestamp_seconds": calibrations.active_since_s,
+            "calibration_invalid_pixels_ratio": None if drift is None else drift.invalid_share,
+        }
 
-    def _frames(self) -> Iterator[Metric]:
-        status = self._service.acquisition.status()
-        yield _counter("frames_captured", "Frames since the service started.", status.frames)
-        yield _gauge("frame_age_seconds", "Since the last frame arrived.", status.frame_age_s)
-        if (device := tm.kernels.device_state()) is not None:
-            yield _counter(
-                "device_results",
-                "Passes and likelihoods that a GPU was asked for, by what computed them.",
-                device["results"],
-                by="device",
-            )
-        latest = self._service.hub.latest
+    def _of_frames(self) -> "_Values":
+        history, latest = self._service.history, self._service.hub.latest
+        values: _Values = {
+            "history_frames": history.count,
+            "history_bytes": history.size_bytes,
+            "history_limit_bytes": history.settings.max_bytes,
+        }
         if latest is None:
-            return
-        if (temperature_c := latest.raw.temperature_c) is not None:
-            yield _gauge(
-                "sensor_temperature_celsius", "Of the camera, with its last frame.", temperature_c
-            )
+            return values
         pixels = self._metrics.pixels
-        yield _gauge(
-            "pixels_flagged_ratio",
-            "Share of the pixels of the last frame that was looked at that carry a flag.",
-            {
-                flag: count / pixels["total"]
-                for flag, count in pixels.items()
-                if flag not in ("total", "valid")
-            },
-            by="flag",
-        )
+        flagged = {
+            flag: n / pixels["total"] for flag, n in pixels.items() if flag not in _UNFLAGGED
+        }
+        temperature_c = latest.raw.temperature_c
+        return values | {
+            "sensor_temperature_celsius": temperature_c,
+            "pixels_flagged_ratio": flagged,
+        }
 
-    def _history(self) -> Iterator[Metric]:
-        history = self._service.history
-        yield _gauge("history_frames", "Former frames that can still be had.", history.count)
-        yield _gauge("history_bytes", "Memory of their raw images.", history.size_bytes)
-        yield _gauge("history_limit_bytes", "What it may be at most.", history.settings.max_bytes)
+    def _of_clients(self) -> "_Values":
+        hub, library = self._service.hub, self._service.recordings
+        totals = library.totals
+        return {
+            "stream_clients": hub.clients,
+            "preview_clients": self._service.mjpeg_clients,
+            "frames_dropped": hub.dropped,
+            "lease_held": self._service.lease.current is not None,
+            "recording_active": library.active_id is not None,
+            "recording_frames": totals.frames,
+            "recording_dropped_frames": totals.dropped_frames,
+            "recording_bytes": totals.size_bytes,
+            "recordings_ended": totals.ended,
+            "disk_waiting_seconds": library.disk_waiting_s,
+            "recording_disk_free_bytes": library.known_free_bytes,
+        }
 
-    def _calibration(self) -> Iterator[Metric]:
-        calibrations = self._service.calibrations
-        yield _gauge(
-            "calibration_active",
-            "Whether a measurement calibrates frames, where it fits the sequence.",
-            calibrations.active_id != NOMINAL_ID,
-        )
-        if (captured_unix_s := calibrations.active_since_s) is not None:
-            yield _gauge(
-                "calibration_timestamp_seconds",
-                "When the active calibration was measured.",
-                captured_unix_s,
-            )
-        if (drift := calibrations.known_drift) is not None:
-            yield _gauge(
-                "calibration_invalid_pixels_ratio",
-                "Share of pixels whose moments contradict each other by more than noise explains.",
-                drift.invalid_share,
-            )
-
-    def _clients(self) -> Iterator[Metric]:
-        hub = self._service.hub
-        lease = self._service.lease.current
-        yield _gauge("stream_clients", "Streams open now.", hub.clients)
-        yield _gauge(
-            "preview_clients",
-            "Clients that receive a preview as MJPEG now.",
-            self._service.mjpeg_clients,
-        )
-        yield _counter(
-            "frames_dropped",
-            "Frames that clients were too slow for, of all clients together.",
-            hub.dropped,
-        )
-        yield _gauge("lease_held", "Whether a client holds the lease.", lease is not None)
-
-    def _recordings(self) -> Iterator[Metric]:
-        library, totals = self._service.recordings, self._service.recordings.totals
-        yield _gauge(
-            "recording_active", "Whether frames are being recorded.", library.active_id is not None
-        )
-        yield _counter("recording_frames", "Frames that were recorded.", totals.frames)
-        yield _counter(
-            "recording_dropped_frames",
-            "Frames that the disk was too slow for.",
-            totals.dropped_frames,
-        )
-        yield _counter("recording_bytes", "Bytes that were written.", totals.size_bytes)
-        yield _counter(
-            "recordings_ended", "Recordings, by why they ended.", totals.ended, by="reason"
-        )
-        yield _gauge(
-            "disk_waiting_seconds",
-            "How long the disk of the recordings has not answered.",
-            library.disk_waiting_s,
-        )
-        if (free_bytes := library.known_free_bytes) is not None:
-            yield _gauge(
-                "recording_disk_free_bytes",
-                "What the disk has left where recordings are kept.",
-                free_bytes,
-            )
-
-    def _relay(self) -> Iterator[Metric]:
-        relay = self._service.relay
+    def _of_relay(self) -> "_Values":
+        relay, latest = self._service.relay, self._service.hub.latest
         if relay is None:
-            return
-        counters = relay.relayed
-        yield _counter(
-            "relay_reconnects", "How often the origin was found again.", counters.reconnects
-        )
-        yield _counter(
-            "relay_origin_restarts",
-            "How often the origin was started anew meanwhile.",
-            counters.restarts,
-        )
-        yield _counter(
-            "relay_dropped_frames",
-            "Frames that the origin dropped because relay or network were too slow.",
-            counters.dropped_frames,
-        )
-        latest = self._service.hub.latest
+            return {}
         hops = {} if latest is None else {str(k): hop for k, hop in enumerate(latest.raw.hops, 1)}
-        yield _gauge(
-            "relay_hop_latency_seconds",
-            "From the arrival of the last frame at the service before to that at the relay, by "
-            "both clocks; hop 1 is the nearest to the camera.",
-            {number: hop.latency_s for number, hop in hops.items()},
-            by="hop",
-        )
-        yield _counter(
-            "relay_hop_missed_frames",
-            "Frames that a relay never got of the service before it.",
-            {number: hop.missed_frames for number, hop in hops.items()},
-            by="hop",
-        )
+        return {
+            "relay_reconnects": relay.relayed.reconnects,
+            "relay_origin_restarts": relay.relayed.restarts,
+            "relay_dropped_frames": relay.relayed.dropped_frames,
+            "relay_hop_latency_seconds": {k: hop.latency_s for k, hop in hops.items()},
+            "relay_hop_missed_frames": {k: hop.missed_frames for k, hop in hops.items()},
+        }
 
 
-def _gauge(name: str, meaning: str, value: float | Mapping[str, float], by: str = "") -> Metric:
-    """Return a value that rises and falls; several of them, each with its value of a label."""
-    return _filled(GaugeMetricFamily, name, meaning, value, by)
-
-
-def _counter(name: str, meaning: str, value: float | Mapping[str, float], by: str = "") -> Metric:
-    """Return a value that only rises; several of them, each with its value of a label."""
-    return _filled(CounterMetricFamily, name, meaning, value, by)
+_Values = dict[str, float | Mapping[str, float] | None]
+_UNFLAGGED: Final = ("total", "valid")
+_FAMILIES: Final = {"gauge": GaugeMetricFamily, "counter": CounterMetricFamily}
 
 
 def _filled(
@@ -310,12 +249,12 @@ def _filled(
     name: str,
     meaning: str,
     value: float | Mapping[str, float],
-    by: str,
+    label: str,
 ) -> Metric:
-    full_name = f"transientcam_{name}"
+    """Return a value; several of them, each with its value of the label."""
     if not isinstance(value, Mapping):
-        return family(full_name, meaning, value)
-    metric = family(full_name, meaning, labels=(by,))
-    for label, each in value.items():
-        metric.add_metric((label,), each)
+        return family(name, meaning, value)
+    metric = family(name, meaning, labels=(label,))
+    for each, number in value.items():
+        metric.add_metric((each,), number)
     return metric
