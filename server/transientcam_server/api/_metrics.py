@@ -118,8 +118,8 @@ gauge | frame_age_seconds | | Since the last frame arrived.
 counter | device_results | device | Passes and likelihoods that a GPU was asked for, by what \
 computed them.
 gauge | sensor_temperature_celsius | | Of the camera, with its last frame.
-gauge | pixels_flagged_ratio | flag | Share of the pixels of the last frame that was looked at that carry \
-a flag.
+gauge | pixels_flagged_ratio | flag | Share of the pixels of the last frame that was looked at \
+that carry a flag.
 gauge | history_frames | | Former frames that can still be had.
 gauge | history_bytes | | Memory of their raw images.
 gauge | history_limit_bytes | | What it may be at most.

@@ -15,7 +15,11 @@ from typing import Any, Final
 
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import Problem, RecordingInUse, kinds
-from transientcam_server.recording import _layout as layout, _names as names, _recovery as recovery
+from transientcam_server.recording import (
+    _layout as layout,
+    _listing as names,
+    _recovery as recovery,
+)
 from transientcam_server.recording._descriptions import Descriptions, of_recorder, of_removed
 from transientcam_server.recording._directory import Directory, id_of
 from transientcam_server.recording._disk_threads import DiskThreads
