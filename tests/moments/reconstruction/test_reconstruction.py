@@ -274,7 +274,11 @@ def test_gains_and_smoothing_are_in_the_noise_of_a_reconstruction() -> None:
     b, _ = _noisy_pair()
     gains = np.array([1.0, 0.8, 0.6j, 0.5, 0.4])
     settings = tm.Settings(
-        zeroth="low-frequency", takes=1, estimator="likelihood", sensor=tm.noise.Sensor()
+        zeroth="low-frequency",
+        takes=1,
+        estimator="likelihood",
+        sensor=tm.noise.Sensor(),
+        neighbours="gaussian",
     )
 
     found = tm.reconstruct(b * gains[:, None, None], settings, calibration=gains)
