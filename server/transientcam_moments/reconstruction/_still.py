@@ -23,8 +23,8 @@ class Measured:
     """Moments of one frame, and what goes with them: between images and all that follows.
 
     A `Reconstructor` that is called with what another one measured, in `Reconstruction.measured`,
-    with the same settings, calibration and bad pixels goes on to the same results, but for the noise
-    of pixels with recovered images; of one take the compiled pass may round in another way.
+    with the same settings, calibration and bad pixels goes on to the same results, but for noise of
+    pixels with recovered images; of one take the compiled pass may round in another way.
 
     Attributes
     ----------
