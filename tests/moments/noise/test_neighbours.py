@@ -84,7 +84,7 @@ def brute_force(b: Array, variance: Array, left_out: Array) -> tuple[Array, Arra
                     alone.append(estimate[p] - estimate[other])
                 misfit = shift = 0.0
                 small = 1 / len(alone)
-                tested = [(sum(alone) / len(alone), 1.0, 1.0)]
+                tested: list[tuple[Array, float, float]] = [(np.mean(alone, axis=0), 1.0, 1.0)]
                 tested += [(off, 0.02 * small, 0.001 * small) for off in alone]
                 for off, part, smaller in tested:
                     misfit += part * (abs(off) ** 2 / variance[:, *p]).sum()
