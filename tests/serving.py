@@ -140,8 +140,8 @@ def serving(
         usual |= {"light": {"directory": f"{state}/light", "delay_s": 0.0, "unused_s": 0.0}}
         # a laden machine may take longer to ask for a frame than a service keeps it
         usual |= {"history": {"seconds": 3600.0}}
-        # "automatic" depends on the kernels that other tests of this process have compiled
-        usual |= {"reconstruction": {"estimator": "pisarenko"}}
+        # the defaults depend on the kernels that other tests of this process have compiled
+        usual |= {"reconstruction": {"estimator": "pisarenko", "neighbours": "gaussian"}}
         chosen = _patient(Settings(camera=camera, **{**usual, **settings}))
         app = build_app(opened, chosen)
         prepare(app)

@@ -81,10 +81,12 @@ def _round(
             by_a, by_c = simd.load(one, present, a), simd.load(one, present, c)
             both, mirrored = 0.25 * (uu + vv) + 0.5 * uv, 0.25 * (tu + tv) * (tu + tv)
             tu, tv = tu * tu, tv * tv
-            of_a = select(by_c > 0.0, both, uu) + neighbours.MISFIT_OF_ONE * uu
-            of_c = select(by_a > 0.0, both, vv) + neighbours.MISFIT_OF_ONE * vv
-            late_a = select(by_c > 0.0, mirrored, tu) + neighbours.SHIFT_OF_ONE * tu
-            late_c = select(by_a > 0.0, mirrored, tv) + neighbours.SHIFT_OF_ONE * tv
+            both = both + 0.5 * neighbours.MISFIT_OF_ONE * (uu + vv)
+            mirrored = mirrored + 0.5 * neighbours.SHIFT_OF_ONE * (tu + tv)
+            of_a = select(by_c > 0.0, both, (1.0 + neighbours.MISFIT_OF_ONE) * uu)
+            of_c = select(by_a > 0.0, both, (1.0 + neighbours.MISFIT_OF_ONE) * vv)
+            late_a = select(by_c > 0.0, mirrored, (1.0 + neighbours.SHIFT_OF_ONE) * tu)
+            late_c = select(by_a > 0.0, mirrored, (1.0 + neighbours.SHIFT_OF_ONE) * tv)
             sa = _agreement(places[k], larger(of_misfit * of_a, of_shift * late_a))
             sc = _agreement(places[k], larger(of_misfit * of_c, of_shift * late_c))
             wa, wc = by_a * sa, by_c * sc

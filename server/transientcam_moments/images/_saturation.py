@@ -21,11 +21,15 @@ class Recovered(NamedTuple):
         Pixels with an image at the end of its scale.
     undetermined : boolean array, shape (...)
         Those of them whose other images leave open what the saturated ones hold.
+    variance : array, shape (...)
+        Of a pixel's moments, over that of images of which none is saturated, as that of an image
+        grows with its light.
     """
 
     images: Array
     saturated: Array
     undetermined: Array
+    variance: Array
 
 
 class _Group(NamedTuple):
@@ -35,6 +39,8 @@ class _Group(NamedTuple):
     weight: float
     prediction: Array
     determined: bool
+    of_kept: Array
+    of_offsets: float
 
 
 def recover_saturated(
@@ -75,21 +81,23 @@ def recover_saturated(
     places = np.flatnonzero(saturated)
     real = np.float64 if takes.dtype == np.float64 else np.float32
     images = flat.astype(real)
-    undetermined = np.zeros(saturated.shape, dtype=bool)
+    undetermined, variance = np.zeros(saturated.shape, dtype=bool), np.ones(saturated.shape, real)
+    variance[places] = 0
     for take in images:
-        values, lost = _filled(take[:, places].astype(float), first, phases_rad, full_scale)
+        values, lost, its = _filled(take[:, places].astype(float), first, phases_rad, full_scale)
         take[:, places] = values
         undetermined[places] |= lost
-    shape = takes.shape[2:]
-    return Recovered(
-        images.reshape(takes.shape), saturated.reshape(shape), undetermined.reshape(shape)
-    )
+        variance[places] += its / len(images)
+    of_pixels = (each.reshape(takes.shape[2:]) for each in (saturated, undetermined, variance))
+    return Recovered(images.reshape(takes.shape), *of_pixels)
 
 
 def _filled(
     values: Array, first: int, phases_rad: Sequence[float], full_scale: float
-) -> tuple[Array, Array]:
-    """Return the images (N, P) of one take with what is implied, and which pixels stay open."""
+) -> tuple[Array, Array, Array]:
+    """Return the images (N, P) of one take with what is implied, which pixels stay open, and how
+    many times the variance of their moments is.
+    """
     phases = len(phases_rad)
     over = values >= full_scale
     lost = over[:first].any(axis=0)
@@ -109,7 +117,13 @@ def _filled(
     predictions = np.stack([group.prediction for group in groups])[which]  # (F, P, phases, phases)
     implied = offset + np.einsum("fpkl,flp->fkp", predictions, np.where(cut, 0.0, grouped - offset))
     found = np.where(cut & ~lost, np.maximum(implied, full_scale), grouped)
-    return np.concatenate([values[:first], found.reshape(values[first:].shape)]), lost
+    light = np.maximum(found, 0.0)
+    own = np.einsum("fpk,fkp->p", np.stack([group.of_kept for group in groups])[which], light)
+    through = np.array([group.of_offsets for group in groups])[which].sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        of_offset = np.einsum("fpk,fkp->p", weights**2, light) / known**2
+        times = np.where(lost, 1.0, (own + through * of_offset) / light.sum(axis=(0, 1)))
+    return np.concatenate([values[:first], found.reshape(values[first:].shape)]), lost, times
 
 
 def _group(phases_rad: Sequence[float], kept: Array) -> _Group:
@@ -117,7 +131,8 @@ def _group(phases_rad: Sequence[float], kept: Array) -> _Group:
 
     ``of_offset`` (phases,) is the part of the constant that cosine and sine of the kept images
     cannot be taken for, and ``weight`` its square; ``prediction`` (phases, phases) makes all images
-    of the kept ones, both less the offset.
+    of the kept ones, both less the offset. ``of_kept`` (phases,) and ``of_offsets`` are squares of
+    what kept images and the offset have in the moment, of which each has 1 where none is saturated.
     """
     phase = np.asarray(phases_rad, dtype=float)
     waves = np.stack([np.cos(phase), np.sin(phase)], axis=1)
@@ -126,4 +141,9 @@ def _group(phases_rad: Sequence[float], kept: Array) -> _Group:
     left = np.where(kept, 1.0 - seen @ (inverse @ kept), 0.0)
     size = np.linalg.svd(seen, compute_uv=False)
     determined = bool(kept.all() or size[-1] > _KNOWN * max(1.0, size[0]))
-    return _Group(left, float(left @ left), waves @ inverse, determined)
+    prediction = waves @ inverse
+    filled = np.where(kept, 0.0, np.exp(1j * phase))
+    own = np.where(kept, np.exp(1j * phase) + filled @ prediction, 0.0)
+    of_offset = filled.sum() - filled @ prediction @ kept
+    squares = np.abs(own) ** 2, float(np.abs(of_offset) ** 2)
+    return _Group(left, float(left @ left), prediction, determined, *squares)

@@ -102,10 +102,11 @@ def average_neighbours(
     -----
     Propagation-separation (Polzehl and Spokoiny, 2006): in rounds of growing radius a neighbour's
     weight falls with its distance and with misfit over noise. The mean of a neighbour and its
-    mirror image is held against the pixel, so that slanted surfaces pass; a second misfit is the
-    one in the direction d b_j = i j b_j, all light later, so that small steps in range show. Of
-    pixels that agree with no pair noise has put more off than structure has: within `OF_NOISE`
-    deviations they get the average beside them, across a slope of both sides. What is flattened
+    mirror image is held against the pixel, so that slanted surfaces pass, and both get one weight,
+    so that noise does not move the mean along the slope; a second misfit is the one in the
+    direction d b_j = i j b_j, all light later, so that small steps in range show. Of pixels that
+    agree with no pair noise has put more off than structure has: within `OF_NOISE` deviations they
+    get the average of both sides beside them, or of one where no two agree. What is flattened
     leaves residuals of one sign along a line of nine pixels: where they are clear the pixel gets
     their mean back, with its variance; else their square counts as noise.
     """
@@ -180,17 +181,19 @@ def _averaged(
             product = (weight * (off[0] * off[1].conj()).real).sum(0)
             both = (alone[0] + alone[1]) / 4 + product / 2
             mirrored = ((later[0] + later[1]) / 2) ** 2
+            beside = (alone[0] + alone[1]) / 2, (later[0] ** 2 + later[1] ** 2) / 2
+            both, mirrored = both + MISFIT_OF_ONE * beside[0], mirrored + SHIFT_OF_ONE * beside[1]
             for i, offset in enumerate((ahead, behind)):
-                single = later[i] ** 2
-                one = xp.where(by[1 - i] > 0, both, alone[i]) + MISFIT_OF_ONE * alone[i]
-                two = xp.where(by[1 - i] > 0, mirrored, single) + SHIFT_OF_ONE * single
+                paired, single = by[1 - i] > 0, later[i] ** 2
+                one = xp.where(paired, both, (1 + MISFIT_OF_ONE) * alone[i])
+                two = xp.where(paired, mirrored, (1 + SHIFT_OF_ONE) * single)
                 doubt = xp.maximum(misfit * one, shift * two) / share
                 agreement = place * xp.clip(2 - doubt, 0, 1)
                 counts = by[i] * agreement
                 mean = mean + counts * _shifted(given, *offset)
                 total, square = total + counts, square + counts * agreement
         total = xp.maximum(total, least)
-        current, share = mean / total, xp.where(there > 0, there * square / total**2, 1)
+        current, share = mean / total, xp.where(there > 0, there * square / total / total, 1)
     return current.astype(raw.dtype), share.astype(weight.dtype)
 
 
@@ -219,7 +222,9 @@ def _joined(
     noise = (misfit < 1 + OF_NOISE * (2 / numbers) ** 0.5) & (its < LONE)
     noise = noise & (later < OF_NOISE**2 * (order * (tangent.conj() * mean).real).sum(0))
     misfit = xp.where(noise & (beside(there, xp.minimum) > 0), misfit, np.inf)
-    best, any_of_them = misfit.argmin(axis=0)[None], xp.isfinite(misfit.min(axis=0))
+    pairs = misfit[: _BESIDE.shape[1]]  # before one side, which is off by a slope
+    paired, any_of_them = (xp.isfinite(each.min(axis=0)) for each in (pairs, misfit))
+    best = xp.where(paired, pairs.argmin(axis=0), misfit.argmin(axis=0))[None]
     mean = xp.where(any_of_them, xp.take_along_axis(mean, best[None], axis=1)[:, 0], own[:, 0])
     its = xp.where(any_of_them, xp.take_along_axis(its, best, axis=0)[0], share.reshape(-1)[places])
     if known_values:

@@ -48,6 +48,8 @@ class CapturedImages(NamedTuple):
         Images that are not as they were captured: none of that frequency and take is used.
     sigma_px : float
         With which the moments are smoothed.
+    variance : array, shape (...), optional
+        Of moments over that of images as they are captured, see `images.Recovered`.
     """
 
     takes: Array
@@ -57,6 +59,7 @@ class CapturedImages(NamedTuple):
     bad_pixels: Array | None = None
     left_out: Array | None = None
     sigma_px: float = 0.0
+    variance: Array | None = None
 
     def ambient(self, brightness: Array, sensor: Sensor | ImageNoise) -> Array | None:
         """Return light that is not the camera's, by `ambient_light` of the first frequency."""
@@ -86,7 +89,7 @@ def image_noise(captured: CapturedImages, brightness: Array) -> ImageNoise | Non
     deviations. Offsets are the same at all frequencies: they serve where there are but three
     phases. Several takes are held against their mean; even harmonics turn with twice the phase.
     """
-    takes, phases_rad, first, saturated_pixels, bad_pixels, left_out, _ = captured
+    takes, phases_rad, first, saturated_pixels, bad_pixels, left_out, *_ = captured
     steps = len(phases_rad)
     stack = np.asarray(takes).reshape((len(takes), takes.shape[1], -1))
     light = np.asarray(brightness).reshape(-1)

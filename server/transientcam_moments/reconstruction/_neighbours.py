@@ -50,6 +50,8 @@ def over_neighbours(
     each is the mean of. Returns the share (H, W) that is left of the variance
     that one frame has by itself, or after the Gaussian, too; None of one frame and a Gaussian.
     """
+    if images is not None and images.variance is not None:  # as the mean of less than one frame
+        frames = (1 if frames is None else frames) / images.variance
     noise = None
     if moments.ndim == 3 and settings.neighbours == "edge-preserving":
         noise = measured_noise(moments, settings, known, calibration, images)

@@ -165,9 +165,10 @@ class Reconstructor:
         if _is_moments(data):
             return self._of_frame(self.measure(data, saturated_pixels=saturated_pixels), spread)
         takes, repaired, recovered, images = self._prepare(data, previous)
-        # behind the smoothing, where a waveform is known: harmonics are taken out there
+        # behind the smoothing, where a waveform is known: harmonics are taken out there; and of
+        # recovered pixels the noise is known pixel by pixel
         keeps_edges = self.settings.neighbours == "edge-preserving"
-        behind = self._waveform is not None or keeps_edges
+        behind = self._waveform is not None or keeps_edges or recovered is not None
         passes = () if behind else self._passes_of_images(takes)
         given = takes[0], saturated_pixels, spread
         planes = self._passed(takes.shape, passes, lambda each: each.images(*given))
@@ -396,6 +397,7 @@ class Reconstructor:
             self._bad,
             None if repaired is None else np.logical_or.reduce(repaired[1:]),
             self.settings.gaussian_px,
+            None if recovered is None else recovered.variance,
         )
 
     def _measured(

@@ -23,8 +23,8 @@ class Measured:
     """Moments of one frame, and what goes with them: between images and all that follows.
 
     A `Reconstructor` that is called with what another one measured, in `Reconstruction.measured`,
-    with the same settings, calibration and bad pixels goes on to the same results; of one take the
-    compiled pass may round in another way.
+    with the same settings, calibration and bad pixels goes on to the same results, but for noise of
+    pixels with recovered images; of one take the compiled pass may round in another way.
 
     Attributes
     ----------
@@ -78,17 +78,21 @@ def over_frames(
 ) -> Measured:
     """Average a frame with the one before; it stays as it is where no one knows its noise."""
     known = known_noise(frame.moments, settings, frame.images)
-    how = frame.images, frame.ambient_dn
-    noise = measured_noise(frame.moments, settings, known, calibration, *how)
+    images = frame.images
+    noise = measured_noise(frame.moments, settings, known, calibration, images, frame.ambient_dn)
     if noise is None or frame.moments.ndim != 3:
         return frame
+    left_out = frame.saturated
+    if left_out is not None and images is not None and images.saturated_pixels is not None:
+        left_out = left_out & ~images.saturated_pixels  # recovered, or NaN
+        noise = MomentNoise(noise.variance * images.variance)
     still = average_frames(
         frame.moments,
         noise,
         None if before is None else before.still,
         most_frames=settings.still_frames,
         multiples=None if settings.multiples is None else (0, *settings.multiples),
-        left_out=frame.saturated,
+        left_out=left_out,
         corrupt=frame.corrupt,
     )
     return replace(frame, image_noise=known, still=still)

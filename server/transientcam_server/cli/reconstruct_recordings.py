@@ -48,7 +48,7 @@ def settings_of(values: Mapping[str, Any]) -> "ReconstructionSettings":
     from transientcam_server.settings import ReconstructionSettings
 
     try:
-        return ReconstructionSettings.model_validate(dict(values))
+        return ReconstructionSettings.recorded(values)
     except ValidationError as error:
         mistake = error.errors()[0]
         raise typer.BadParameter(f"{mistake['loc'][0]}: {mistake['msg']}") from error

@@ -347,7 +347,9 @@ def settings(scene: Scene, spoilt_images: str, takes: int = 1) -> tm.Settings:
         zeroth=scene.zeroth,
         takes=takes,
         spoilt_images=spoilt_images,
-        estimator="pisarenko",  # no noise, which is measured in the images that were not repaired
+        # neither needs the noise, which is measured in the images that were not repaired
+        estimator="pisarenko",
+        neighbours="gaussian",
     )
 
 

@@ -104,3 +104,29 @@ def test_a_pixel_that_is_missing_hides_no_saturated_one() -> None:
 
     assert found is not None
     np.testing.assert_array_equal(found.saturated, [False, True, False])
+
+
+@pytest.mark.parametrize(
+    "phases", [FOUR_PHASES_RAD, (0.0, 2.0, 4.0), tuple(np.arange(8) * np.pi / 4)]
+)
+def test_the_variance_of_moments_is_that_of_noisy_images(phases: tuple[float, ...]) -> None:
+    random = np.random.default_rng(3)
+    b = 800 * np.exp(1j * random.uniform(0, 2 * np.pi, (3, 20_000)))
+    clean = images(b, np.full(20_000, 500.0), phases)
+    full = float(np.quantile(clean, 0.8))
+    noisy = clean + np.sqrt(clean / 500) * random.normal(size=clean.shape)  # as of photons
+
+    found = recover_saturated(np.minimum(noisy, full), 0, phases, full)
+
+    assert found is not None
+    turn = np.exp(1j * np.array(phases))
+    off = np.einsum("k,fkp->fp", turn, (found.images - clean).reshape(3, len(phases), -1))
+    whole = len(phases) * found.variance  # of images with an offset of 500 each
+    over = (np.abs(off) ** 2).mean(axis=0) / whole
+    known = found.saturated & ~found.undetermined
+    for least in np.unique(np.round(found.variance[known], 1)):  # one kind of pixel after another
+        alike = known & (np.abs(found.variance - least) < 0.06)
+        if alike.sum() > 500:
+            assert over[alike].mean() == pytest.approx(1.0, abs=0.25)
+    assert over[known].mean() == pytest.approx(1.0, abs=0.15)
+    assert (found.variance[~found.saturated] == 1).all()

@@ -53,6 +53,7 @@ def settings(zeroth: str, sigma_px: float = 0.0) -> tm.Settings:
         takes=1,
         base_frequency_hz=23e6,
         smoothing_sigma_px=sigma_px,
+        neighbours="gaussian",
         sensor=SENSOR,
     )
 

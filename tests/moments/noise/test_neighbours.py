@@ -78,14 +78,16 @@ def brute_force(b: Array, variance: Array, left_out: Array) -> tuple[Array, Arra
                 place = 1 - (row**2 + column**2) / (radius + 0.5) ** 2
                 if place <= 0 or not there[q] or max(abs(row), abs(column)) > 4:
                     continue
-                alone = estimate[p] - estimate[q]
+                alone = [estimate[p] - estimate[q]]
                 other = (p[0] - row, p[1] - column)
-                both = (
-                    estimate[p] - (estimate[q] + estimate[other]) / 2 if there.get(other) else alone
-                )
+                if there.get(other):  # both get one weight
+                    alone.append(estimate[p] - estimate[other])
                 misfit = shift = 0.0
-                for off, small, smaller in ((both, 1, 1), (alone, 0.02, 0.001)):
-                    misfit += small * (abs(off) ** 2 / variance[:, *p]).sum()
+                small = 1 / len(alone)
+                tested: list[tuple[Array, float, float]] = [(np.mean(alone, axis=0), 1.0, 1.0)]
+                tested += [(off, 0.02 * small, 0.001 * small) for off in alone]
+                for off, part, smaller in tested:
+                    misfit += part * (abs(off) ** 2 / variance[:, *p]).sum()
                     later = (tangent.conj() * off / variance[:, *p]).real.sum()
                     shift += smaller * later**2 / max(information, 1e-300)
                 doubt = worth[p] * max(misfit / (4 * numbers), 2 * shift / 8)
@@ -159,9 +161,9 @@ def joined(
                 information = (abs(j * mean) ** 2 / variance[:, *p]).sum()
                 chance = misfit < numbers + 4 * math.sqrt(2 * numbers)
                 if chance and later**2 < 16 * information and share < 0.5:
-                    candidates.append((misfit, share, mean))
+                    candidates.append((len(group) == 1, misfit, share, mean))
         if candidates:
-            _, share, new[p] = min(candidates, key=lambda each: each[0])
+            *_, share, new[p] = min(candidates, key=lambda each: each[:2])
             new_worth[p] = 1 / share
     return new_worth, new
 

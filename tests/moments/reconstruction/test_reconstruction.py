@@ -274,7 +274,11 @@ def test_gains_and_smoothing_are_in_the_noise_of_a_reconstruction() -> None:
     b, _ = _noisy_pair()
     gains = np.array([1.0, 0.8, 0.6j, 0.5, 0.4])
     settings = tm.Settings(
-        zeroth="low-frequency", takes=1, estimator="likelihood", sensor=tm.noise.Sensor()
+        zeroth="low-frequency",
+        takes=1,
+        estimator="likelihood",
+        sensor=tm.noise.Sensor(),
+        neighbours="gaussian",
     )
 
     found = tm.reconstruct(b * gains[:, None, None], settings, calibration=gains)
@@ -367,7 +371,8 @@ def test_moments_as_measured_give_what_their_images_gave(estimator: str) -> None
     m, takes = 2, 3
     rng = np.random.default_rng(1)
     images = rng.integers(200, 3000, (takes * 4 * (m + 1), *SHAPE)).astype(np.uint16)
-    images[5, 2, 3] = 4095  # saturated
+    # saturated, and not recovered: what that leaves of the noise only the images tell
+    images[4:8, 2, 3] = 4095
     bad = np.zeros(SHAPE, bool)
     bad[4, 4] = True
     gains = rng.uniform(0.5, 1.0, (m + 1, *SHAPE)).astype(np.complex64)
@@ -379,6 +384,7 @@ def test_moments_as_measured_give_what_their_images_gave(estimator: str) -> None
         full_scale=4095.0,
         spoilt_images="keep",
         sensor=tm.noise.Sensor(dark_dn=3000.0),  # so that there is no ambient light
+        neighbours="gaussian",
     )
     reconstructor = tm.Reconstructor(settings, calibration=gains, bad_pixels=bad)
     ours = reconstructor(images)
@@ -388,4 +394,5 @@ def test_moments_as_measured_give_what_their_images_gave(estimator: str) -> None
     again = reconstructor(tm.Measured(np.array(ours.measured), saturated))
 
     for name in ("measured", "smoothed", "moments", "flags", "validity", "range_m", "direct"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(ours, name), err_msg=name)
+        found, expected = getattr(again, name), getattr(ours, name)
+        np.testing.assert_allclose(found, expected, rtol=1e-6, err_msg=name)

@@ -112,7 +112,7 @@ def test_predicted_deviations_are_those_of_noisy_frames() -> None:
     light = (900 + np.real(b[:, None] * np.exp(-1j * np.array(phases))[:, None, None])) / 2
     electrons = rng.poisson(9 * light) + rng.normal(0, 30, light.shape)
     raw = (64 + electrons / 9).reshape(9, *phase.shape)
-    noisy = settings(takes=1, phases_rad=phases, sensor=sensor)
+    noisy = settings(takes=1, phases_rad=phases, sensor=sensor, neighbours="none")
 
     found = tm.reconstruct(raw, noisy, calibration=np.ones(4))
 
@@ -143,7 +143,8 @@ def test_ambiguous_and_unexplained_phases_are_flagged() -> None:
     sensor = tm.noise.Sensor(
         gain_e_per_dn=9.0, full_well_e=40_000.0, read_noise_e=30.0, dark_dn=64.0, bits=12
     )
-    stated = settings(estimator="unwrapped-phase", takes=1, sensor=sensor)
+    chosen = {"estimator": "unwrapped-phase", "neighbours": "none"}
+    stated = settings(takes=1, sensor=sensor, **chosen)
     two = moments((PHASE, 500.0), (PHASE + 0.35, 300.0))
     clear = tm.reconstruct(moments((PHASE, 500.0)), stated, calibration=np.ones(4))
 

@@ -89,7 +89,7 @@ def test_a_measured_calibration_goes_before_them_where_it_fits() -> None:
 
 def test_moments_are_divided_by_them() -> None:
     raw = frame(2)
-    settings = ReconstructionSettings(smoothing_px=0.0)
+    settings = ReconstructionSettings(neighbours="none")
     recipe = Recipe(APPLIED, settings, 4095.0, factory_gains(REPORTING.factory))
 
     found = recipe.reconstruct(raw)

@@ -86,7 +86,8 @@ def with_frame(
     async def main() -> None:
         with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor:
             workers = Workers(executor, count=2)
-            settings = ReconstructionSettings(estimator="pisarenko")
+            # whose numbers are the same whether its kernel is compiled or not
+            settings = ReconstructionSettings(estimator="pisarenko", neighbours="gaussian")
             pipeline = Pipeline(camera, settings, workers, sensor=sensor)
             try:
                 await test(pipeline, pipeline.frame(raw, camera.applied))

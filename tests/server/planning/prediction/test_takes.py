@@ -61,7 +61,7 @@ def test_noise_falls_with_the_root_of_the_takes_and_the_error_of_the_model_does_
 
         assert camera.state == "idle"
         camera.start()
-        settings = ReconstructionSettings(smoothing_px=0.0, estimator="two-returns")
+        settings = ReconstructionSettings(neighbours="none", estimator="two-returns")
         gains = factory_gains(camera.factory)
         recipe = Recipe(camera.applied, settings, 4095.0, gains, sensor=sensor)
         shown_m = recipe.reconstruct(camera.read_frame(timeout_s=60.0)).range_std_m
