@@ -196,6 +196,7 @@ class Service:
                 darkness=self._darkness,
             )
         )
+        self.hub.obstacle = lambda: self.acquisition.status().obstacle
         self.origin_lease = (
             None if self.relay is None else OriginLease(self.relay, self.acquisition)
         )

@@ -12,8 +12,6 @@ import pytest
 from tests.conftest import ROOT
 from transientcam_moments.noise import MomentNoise
 
-pytest.importorskip("onnxruntime", reason="the learned estimator needs onnxruntime")
-
 
 @pytest.fixture(scope="module")
 def learned() -> Iterator[ModuleType]:

@@ -27,4 +27,5 @@ from transientcam_driver.camera._simulation import (
     SurfaceSeen,
     Truth,
 )
+from transientcam_driver.camera._stated import finite, require, require_image, require_stated
 from transientcam_driver.camera._status import DeviceState, Status, StatusFlag

@@ -40,6 +40,7 @@ class HostCamera(ABC):
         self._state = CameraState.CONNECTING
         self._closed = False
         self._resume = False
+        self._loss = "it is disconnected"  # why, where that is known
 
     @property
     def capabilities(self) -> Capabilities:
@@ -104,4 +105,4 @@ class HostCamera(ABC):
     def _require_connected(self) -> None:
         self._require_open()
         if self._state is CameraState.DISCONNECTED:
-            raise CameraLost("it is disconnected")
+            raise CameraLost(self._loss)

@@ -1,13 +1,15 @@
 """Open a camera by its name, ``NAME:ADDRESS?option=value``, through the plug-in of that name."""
 
+from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
-from typing import Final
+from typing import Final, TypeVar
 
 from transientcam_driver.camera._camera import Camera
 from transientcam_driver.camera._plugin import GROUP, CameraName, CameraPlugin
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.errors import PluginError, SpecError
+from transientcam_driver.errors import DriverError, PluginError, SpecError
 
+_T = TypeVar("_T")
 DEFAULT_SPEC: Final = "sim:mirrors"
 
 
@@ -35,7 +37,10 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
         The camera is absent, busy, or may not be opened.
     """
     name, plugin = plugin_of(spec)
-    return plugin.open(name, clock or RealClock())
+    camera = _of_package(name.kind, "open", plugin.open, name, clock or RealClock())
+    if not hasattr(camera, "read_frame"):
+        raise PluginError(name.kind, f"open() returned {camera!r:.60}, no Camera")
+    return camera
 
 
 def check_camera(spec: str) -> None:
@@ -44,7 +49,7 @@ def check_camera(spec: str) -> None:
     Raises DriverError as `open_camera`, as far as it can be known.
     """
     name, plugin = plugin_of(spec)
-    plugin.check(name)
+    _of_package(name.kind, "check", plugin.check, name)
 
 
 def kinds() -> tuple[str, ...]:
@@ -77,10 +82,20 @@ def _load(point: EntryPoint) -> CameraPlugin:
         plugin = point.load()
     except ModuleNotFoundError as error:
         raise PluginError(point.name, f"the package {error.name} is not installed") from error
-    except Exception as error:  # of a package that is not ours
+    except (Exception, SystemExit) as error:  # of a package that is not ours
         reason = f"{point.value} cannot be imported: {type(error).__name__}: {error}"
         raise PluginError(point.name, reason) from error
     if not isinstance(plugin, CameraPlugin):
         reason = f"{point.value} is a {type(plugin).__name__}, not a CameraPlugin"
         raise PluginError(point.name, reason)
     return plugin
+
+
+def _of_package(kind: str, call: str, function: Callable[..., _T], *given: object) -> _T:
+    """Return what a plug-in's function returns; PluginError where it raises what is no sentence."""
+    try:
+        return function(*given)
+    except DriverError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise PluginError(kind, f"{call}() raised {error!r:.200}") from error

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from transientcam_moments.arrays import Array
+from transientcam_moments.comparisons._estimate import Estimate
 from transientcam_moments.comparisons._technique import Technique
 from transientcam_moments.errors import PluginFailed
 from transientcam_moments.moment_problem import Separation
@@ -42,8 +43,13 @@ def separated(
     technique, failed = PLUGINS.load(name), partial(PluginFailed, PLUGINS.kind, name)
     try:
         with np.errstate(all="ignore"):  # of pixels without light
-            parts = technique.of(b.copy(), noise, frequencies_hz).separate(threshold)
-        direct, indirect, phase = (np.asarray(part, b.real.dtype) for part in parts)
+            estimate: object = technique.of(b.copy(), noise, frequencies_hz)
+            if not isinstance(estimate, Estimate):
+                raise failed(f"it returned {estimate!r:.60}, no Estimate")
+            parts = [np.asarray(part) for part in estimate.separate(threshold)]
+        direct, indirect, phase = (part.astype(b.real.dtype, casting="same_kind") for part in parts)
+    except PluginFailed:
+        raise
     except Exception as error:
         raise failed(in_words(error)) from error
     for field, part in zip(Separation._fields, (direct, indirect, phase), strict=True):

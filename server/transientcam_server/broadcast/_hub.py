@@ -5,7 +5,7 @@ Everything here lives on the event loop and never waits for a client.
 
 import asyncio
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from transientcam import wire
@@ -22,6 +22,7 @@ class Hub:
     ``reads``: how often a single frame was asked for.
     ``dropped``: frames that clients were too slow for, of all clients together.
     ``deserted``: set while there are no clients.
+    ``obstacle``: says why no frames come and what helps; empty where that is not known.
     """
 
     def __init__(self) -> None:
@@ -30,6 +31,7 @@ class Hub:
         self.dropped = 0
         self._outboxes: set[Outbox] = set()
         self._arrived = asyncio.Event()
+        self.obstacle: Callable[[], str] = lambda: ""
         self._closed = False
         self._numbers = ChannelNumbers()
         self.deserted = asyncio.Event()
@@ -110,7 +112,10 @@ class Hub:
         if self._closed:
             raise Problem(kinds.SHUTTING_DOWN, "The service shuts down.")
         what = f"No frame after frame {after}" if after else "No frame"
-        raise Problem(kinds.NO_FRAME_YET, f"{what} was captured within {wait_s:g} s of waiting.")
+        why = f": {obstacle}." if (obstacle := self.obstacle()) else "."
+        raise Problem(
+            kinds.NO_FRAME_YET, f"{what} was captured within {wait_s:g} s of waiting{why}"
+        )
 
     def close(self) -> None:
         """Close all streams, and those that join later."""

@@ -101,6 +101,7 @@ class Acquisition:
         self._running = True
         self._connected = True
         self._lost: str | None = None
+        self._failed: str | None = None
         self._started = False
         self._attempts = 0
         self._frames = 0
@@ -250,7 +251,7 @@ class Acquisition:
             rate_hz=rate_hz,
             frames=self._frames,
             frame_age_s=age_s,
-            reason=self._lost or (None if dark is None else str(dark)),
+            reason=self._lost or (self._failed if dark is None else str(dark)),
             stalled=state in ("starting", "streaming") and age_s > stalled_s,
             light_on_in_s=self._announcement.light_on_in_s,
             off_because=None if dark is None else dark.cause,
@@ -282,8 +283,9 @@ class Acquisition:
             except CameraError as error:
                 if not self._shut_off_by_device(error):
                     self._camera_lost(str(error))
-            except Exception:
+            except Exception as error:
                 # no failure with one frame may end the acquisition
+                self._failed = f"the acquisition failed and is continued: {error!r:.200}"
                 _log.exception("the acquisition failed and is continued")
                 self._run_commands(wait_s=BACKOFF_S[-1])
         self._run_commands(wait_s=0.0)
@@ -553,6 +555,7 @@ class Acquisition:
 
     def _camera_works(self) -> None:
         """Report a lost camera as back only once it has completed a request."""
+        self._failed = None
         if self._lost is not None:
             _log.info("the camera is back after %d attempts", self._attempts)
             self._lost = None

@@ -39,6 +39,18 @@ class AcquisitionStatus:
             reasons.append("the light is announced and not on yet")
         if self.state in ("starting", "streaming") and not self.frames:
             reasons.append("the camera is starting")
+        if self.state in ("starting", "streaming") and self.reason:
+            reasons.append(self.reason)
         if self.stalled:
             reasons.append(f"no frame arrived for {self.frame_age_s:.1f} s")
         return reasons
+
+    @property
+    def obstacle(self) -> str:
+        """Why no frames come, and what helps; empty where they come or may soon."""
+        if self.state == "stopped":
+            remedy = 'PUT /api/v1/acquisition {"running": true} starts the capture'
+            return f"{self.reason or 'nothing is captured'}. {remedy}"
+        if self.state == "calibrating":
+            return "a calibration has the camera; frames come after it"
+        return "; ".join(self.obstacles)

@@ -1,12 +1,21 @@
+import sys
 from functools import partial
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.driver.conftest import OpenCamera
-from transientcam_driver import CameraName, CameraNotFound, PluginError, SceneError, SpecError
+from transientcam_driver import (
+    CameraName,
+    CameraNotFound,
+    CameraPlugin,
+    PluginError,
+    SceneError,
+    SpecError,
+)
 from transientcam_driver.camera import _opening as opening, check_camera, open_camera
 from transientcam_driver.camera._plugin import GROUP
 from transientcam_driver.cameras.open_usb._transport import SameCamera
@@ -213,6 +222,24 @@ def test_a_plug_in_that_cannot_be_used_says_why(
     monkeypatch: pytest.MonkeyPatch, values: list[str], reason: str
 ) -> None:
     offer(monkeypatch, *values)
+
+    with pytest.raises(PluginError, match=reason):
+        open_camera("odd:1")
+
+
+@pytest.mark.parametrize(
+    ("opens", "reason"),
+    [
+        (lambda name, clock: {}["lut"], r"open\(\) raised KeyError\('lut'\)"),
+        (lambda name, clock: sys.exit(5), r"open\(\) raised SystemExit\(5\)"),
+        (lambda name, clock: None, r"open\(\) returned None, no Camera"),
+    ],
+)
+def test_what_a_package_does_instead_of_opening_a_camera_is_said(
+    monkeypatch: pytest.MonkeyPatch, opens: Any, reason: str
+) -> None:
+    plugin = CameraPlugin("odd", "odd:", opens)
+    monkeypatch.setattr(opening, "plugin_of", lambda spec: (CameraName.parse(spec), plugin))
 
     with pytest.raises(PluginError, match=reason):
         open_camera("odd:1")

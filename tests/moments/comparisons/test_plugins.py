@@ -112,7 +112,8 @@ def raises(b: Any) -> SparseEstimate:
         (raises, "ZeroDivisionError: by hand"),
         (lambda b: one_return(b[:, :2]), r"shape \(2,\), and the pixels have \(3,\)"),
         (lambda b: one_return(b * np.nan), "no finite phase"),
-        (lambda b: None, "AttributeError"),
+        (lambda b: None, "returned None, no Estimate"),
+        (lambda b: SparseEstimate(b[1:2] * 0 + 1j, abs(b[1:2]), b[0].real * 0), "complex"),
         (lambda b, extra: None, "TypeError"),
     ],
 )

@@ -75,10 +75,13 @@ def test_waiting_for_a_frame_ends_with_it() -> None:
 @pytest.mark.parametrize("wait_s", [0.0, 0.01])
 def test_waiting_for_a_frame_that_does_not_come_is_a_problem(wait_s: float) -> None:
     async def test() -> None:
+        hub = Hub()
+        hub.obstacle = lambda: "the camera is lost: no answer"
         with pytest.raises(Problem) as caught:
-            await Hub().newest(after=0, wait_s=wait_s)
+            await hub.newest(after=0, wait_s=wait_s)
 
         assert caught.value.kind.slug == "no-frame-yet"
+        assert str(caught.value).endswith("of waiting: the camera is lost: no answer.")
 
     run(test)
 

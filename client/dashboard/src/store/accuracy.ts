@@ -13,6 +13,9 @@ export class Accuracy {
   readonly looked = signal<ChoiceDocument | null>(null);
   /** A plan that was made, and a picture of the error that it predicts of each pixel: an address; null while there is none. */
   readonly mapped = signal<{ readonly plan: PlanDocument; readonly url: string } | null>(null);
+  /** Estimators of other packages, by name and label, and the one to plan with: "" for the best of the service's own. */
+  readonly others = signal<readonly Readonly<{ name: string; label: string }>[]>([]);
+  readonly estimator = signal("");
   /** What the service computes for this page. */
   readonly job = signal<JobDocument | null>(null);
   /** Why the last question had no answer. */
@@ -29,7 +32,7 @@ export class Accuracy {
   async predict(): Promise<void> {
     const scene = this.#scene.peek();
     await this.#ask(
-      () => this.api.ask("POST /tradeoff/jobs", { body: { by: "range_error_m" } }),
+      () => this.api.ask("POST /tradeoff/jobs", { body: { by: "range_error_m", estimator: this.estimator.peek() || null } }),
       ({ result }) => {
         const soFar = result as TradeoffDocument | null;
         if (soFar === null || soFar.front.length === 0) return;
@@ -47,7 +50,7 @@ export class Accuracy {
     this.mapped.value = null;
     let made: string | null = null;
     await this.#ask(
-      () => this.api.ask("POST /plan/jobs", { body: { ...goal, map: true } }),
+      () => this.api.ask("POST /plan/jobs", { body: { ...goal, map: true, estimator: this.estimator.peek() || null } }),
       ({ id, result, state }) => {
         if (result !== null) this.looked.value = result as unknown as PlanDocument;
         if (state === "done") made = id;

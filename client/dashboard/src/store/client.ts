@@ -262,11 +262,14 @@ export class StreamClient {
 
   /** Reads which products the camera does not have: before the first subscription, which asks for no other. */
   async learnAbsent(): Promise<void> {
-    const { api, frames } = this.store;
+    const { api, frames, accuracy } = this.store;
     try {
-      const { absent_products, products } = await api.ask("GET /info");
+      const { absent_products, estimators, products } = await api.ask("GET /info");
       const others = products.filter(({ stated }) => stated !== null).map(({ name, unit, summary }) => mapOf(name, unit, summary));
       if (others.length > 0) frames.maps.value = [...MAP_PRODUCTS, ...others];
+      accuracy.others.value = estimators.flatMap(({ name, label, unusable }) =>
+        unusable === null ? [{ name, label: label ?? name }] : [],
+      );
       const absent = Object.fromEntries(absent_products.map(({ name, reason }) => [name, reason]));
       if (JSON.stringify(absent) !== JSON.stringify(frames.absent.peek())) frames.absent.value = absent;
     } catch (error) {

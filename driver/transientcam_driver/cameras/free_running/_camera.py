@@ -8,7 +8,13 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import AppliedSequence, Capabilities, FactoryCalibration, RawFrame
+from transientcam_driver.camera import (
+    AppliedSequence,
+    Capabilities,
+    FactoryCalibration,
+    RawFrame,
+    finite,
+)
 from transientcam_driver.cameras.free_running._frequencies import common_base
 from transientcam_driver.cameras.free_running._measurement import Capture, Description
 from transientcam_driver.cameras.free_running._rendering import BITS, Renderer
@@ -20,6 +26,7 @@ from transientcam_supervisor import OffSwitch
 RECEIVE_S: Final = 0.1
 """How long a device is waited for in one go, and so a stop."""
 _MOST_TAKES: Final = 16
+_SILENT_PERIODS: Final = 5.0
 _HANGS_S: Final = 1.0
 """A ``receive`` that has not returned by then is left behind: the light must go off."""
 
@@ -98,6 +105,8 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         about = self._device.description
         self._renderer = Renderer(about)
         self._capabilities = capabilities_of(about, self._renderer)
+        # slow cameras have time for some frames
+        self._silence_s = max(self._silence_s, _SILENT_PERIODS / about.frame_rate_hz)
         made = self._renderer
         self.factory = FactoryCalibration(made.gains, about.lens, made.sensor, about.extrinsics)
 
@@ -115,7 +124,7 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         return self._device.temperature_c()
 
     def _silence(self) -> str:
-        return self._spoilt or f"{self._number} frames"
+        return self._spoilt or f"{self._number} frames since it was opened"
 
     def _set(self, applied: AppliedSequence) -> None:
         again = self._lit and applied.sequence.exposure_s != self._applied.sequence.exposure_s
@@ -190,7 +199,7 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
             device_time_s=first.device_time_s,
             host_time_s=self._clock.unix_s(),
             capture_s=max(0.0, capture.device_time_s - first.device_time_s) + last_s,
-            temperature_c=capture.temperature_c,
+            temperature_c=finite(capture.temperature_c),
             lost_images=self._lost,
         )
         self._lost = 0

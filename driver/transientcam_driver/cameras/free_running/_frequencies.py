@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from transientcam_driver.cameras.free_running._measurement import require
+from transientcam_driver.camera import require
 from transientcam_driver.sequence import MAX_HARMONICS, MAX_MULTIPLE, SPEED_OF_LIGHT_M_S
 
 _PHASE_RAD = 1e-4

@@ -9,8 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import Extrinsics, Lens, Sensor
-from transientcam_driver.errors import ProtocolError
+from transientcam_driver.camera import (
+    Extrinsics,
+    Lens,
+    Sensor,
+    require,
+    require_image,
+    require_stated,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,10 +111,10 @@ class Description:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be measured (ProtocolError)."""
+        require_stated(self)
+        require_image(self.width, self.height, self.bits)
         require("measurements", len(self.measurements), "at least one", self.measurements)
         require("frame_rate_hz", self.frame_rate_hz > 0, "above 0 Hz", self.frame_rate_hz)
-        require("width, height", min(self.size) > 0, "1 or more", self.size)
-        require("bits", 1 <= self.bits <= 16, "1 to 16", self.bits)
         for at, each in enumerate(self.measurements):
             name, f_hz = f"measurements[{at}]", each.frequency_hz
             require(f"{name}.frequency_hz", 0 < f_hz < math.inf, "above 0 Hz", f_hz)
@@ -129,9 +135,3 @@ class Description:
     def size(self) -> tuple[int, int]:
         """Height and width in pixels."""
         return self.height, self.width
-
-
-def require(field: str, kept: object, limit: str, value: object) -> None:
-    """Raise ProtocolError, which names field, value and limit, unless a condition is kept."""
-    if not kept:
-        raise ProtocolError(f"{field} is {value}; allowed: {limit}")

@@ -11,14 +11,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import Sensor
+from transientcam_driver.camera import Sensor, finite, require
 from transientcam_driver.cameras.free_running._measurement import (
     Capture,
     Description,
     Exposure,
     Measurement,
     Moment,
-    require,
 )
 from transientcam_driver.sequence import FOUR_PHASES_RAD
 
@@ -27,6 +26,8 @@ _HIGHEST: Final = (1 << BITS) - 1
 _DARK_DN: Final = 4096.0
 _MIDDLE_DN: Final = 32768.0
 """Of images that are differences, or beside them."""
+_LATEST_S: Final = 1e10
+"""Of a device's clock: its nanoseconds are counted in 64 bits."""
 _ROUNDING: Final = 1 / 12
 _USUAL_LIGHT: Final = 0.1
 """Of what the converter holds."""
@@ -71,9 +72,10 @@ class Renderer:
         self._dark_dn = self.dark_dn or _DARK_DN
         self._scales = self._scaled(moments)
         self.sensor = self._sensor(bool(moments))
-        gains = np.stack([np.ones(about.size), *map(self._gain, self._groups, self._scales)])
-        same = np.allclose(gains, 1, rtol=0, atol=1e-12)
-        self.gains = None if same else gains.astype(np.complex64)
+        gains = [np.ones(1), *map(self._gain, self._groups, self._scales)]
+        same = all(np.allclose(gain, 1, rtol=0, atol=1e-12) for gain in gains)
+        whole = [np.broadcast_to(gain, about.size) for gain in gains]
+        self.gains = None if same else np.array(whole, np.complex64)
 
     def images(self, capture: Capture) -> NDArray[np.uint16]:
         """Return the images of a frame. Raises ProtocolError where it does not fit."""
@@ -84,29 +86,42 @@ class Renderer:
         types = [each.dtype for each in images]
         fit = all(each.kind in allowed for each, allowed in zip(types, numbers, strict=True))
         require("images", fit, "numbers, of exposures real ones", types)
-        time_s = capture.device_time_s
-        require("device_time_s", math.isfinite(time_s), "finite", time_s)
-        made = [
-            self._of_frequency(group, scale, [images[at] for at in group.places])
-            for group, scale in zip(self._groups, self._scales, strict=True)
+        times = {"device_time_s": capture.device_time_s, "capture_s": capture.capture_s or 0.0}
+        for name, value_s in times.items():
+            known_s = finite(value_s)
+            known = known_s is not None and abs(known_s) < _LATEST_S
+            require(name, known, f"a number below {_LATEST_S:g} s", value_s)
+        moments = [
+            np.isnan(each)
+            for each, kind in zip(images, kinds, strict=True)
+            if isinstance(kind, Moment)
         ]
+        dark = np.all(moments, axis=0)  # of a pixel without any, there is no light
+        with np.errstate(over="ignore", invalid="ignore"):  # of spoilt pixels
+            made = [
+                self._of_frequency(group, scale, [images[at] for at in group.places], dark)
+                for group, scale in zip(self._groups, self._scales, strict=True)
+            ]
         return np.concatenate(made)
 
     def _of_frequency(
-        self, group: _Group, scale: _Array, images: list[_Array]
+        self, group: _Group, scale: _Array, images: list[_Array], dark: NDArray[np.bool_]
     ) -> NDArray[np.uint16]:
         """Return the images of a frequency; of a spoilt pixel all are of the highest code."""
         if isinstance(group.first, Moment):
             moment: Any = images[0]
-            spoilt = abs(moment) > group.first.largest
-            values = np.nan_to_num(np.stack([moment.real, moment.imag]))
+            spoilt = ~(abs(moment) <= group.first.largest) & ~dark
+            values = np.where(spoilt | dark, 0.0, np.stack([moment.real, moment.imag]))
         else:
             spoilt = ~(np.max(images, axis=0) < (1 << self._about.bits) - 1)  # as NaN is
             values = np.stack(list(map(self._light, group.places, images)))
             values = np.where(np.isfinite(values), values, 0.0)
-        made = np.rint(np.tensordot(group.matrix, values, 1) * scale + self._dark_dn)
-        made = np.where(spoilt, _HIGHEST, np.clip(made, 0, _HIGHEST - 1))
-        return np.asarray(made, np.uint16)
+        made = np.tensordot(group.matrix, values, 1)
+        made *= scale
+        made += self._dark_dn
+        rounded = np.clip(np.rint(made, out=made), 0, _HIGHEST - 1, out=made).astype(np.uint16)
+        rounded[:, spoilt] = _HIGHEST
+        return rounded
 
     def _light(self, at: int, image: _Array) -> _Array:
         tap: Any = self._about.measurements[at]
@@ -191,13 +206,13 @@ class Renderer:
         )
 
     def _gain(self, group: _Group, scale: _Array) -> _Array:
-        """Return what the moments of a frequency are divided by, (H, W)."""
+        """Return what the moments of a frequency are divided by, one or (H, W)."""
         gain, reference = scale / np.median(self._scales[0]), self._groups[0].first
         if isinstance(group.first, Moment):
             gain = gain * group.first.gain
         elif isinstance(reference, Exposure):
             gain = gain * (group.first.exposure_s / reference.exposure_s)
-        return np.broadcast_to(gain, self._about.size)
+        return np.asarray(gain)
 
 
 def _phases_of(kinds: list[Measurement]) -> _Array:

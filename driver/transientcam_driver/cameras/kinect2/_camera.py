@@ -106,7 +106,7 @@ class Kinect2Camera(StreamedCamera[Kinect2, Arrival]):
 
     def _silence(self) -> str:
         torn = self.counters.resyncs
-        return f"{torn} pieces of images" if torn else "nothing"
+        return f"{torn} pieces of images since it was opened" if torn else super()._silence()
 
 
 def off_switch(node: str) -> OffSwitch:

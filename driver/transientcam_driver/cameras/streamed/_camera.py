@@ -15,10 +15,16 @@ from typing import Any, Final, Generic, Protocol, TypeVar, cast
 from transientcam_driver.camera import (
     AppliedSequence,
     CameraState,
+    Capabilities,
+    FactoryCalibration,
     HostCamera,
     RawFrame,
     Simulation,
     Status,
+    finite,
+    require,
+    require_image,
+    require_stated,
 )
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import (
@@ -86,8 +92,10 @@ def within(limit_s: float, name: str, call: Callable[..., _T], *given: Any) -> _
     def run() -> None:
         try:
             answer.set_result(call(*given))
-        except BaseException as error:  # raised below
+        except DriverError as error:  # raised below
             answer.set_exception(error)
+        except BaseException as error:  # also SystemExit, which would end the thread that asks
+            answer.set_exception(CameraLost(f"{name}() raised {error!r:.200}"))
 
     try:
         thread = threading.Thread(target=run, name=f"device-{name}", daemon=True)
@@ -96,12 +104,8 @@ def within(limit_s: float, name: str, call: Callable[..., _T], *given: Any) -> _
         run()
     try:
         return answer.result(limit_s if math.isfinite(limit_s) else None)
-    except DriverError:
-        raise
-    except Exception as error:
-        if not answer.done():
-            raise CameraLost(f"{name}() has not returned for {limit_s:g} s") from None
-        raise CameraLost(f"{name}() raised {error!r}") from error
+    except TimeoutError:
+        raise CameraLost(f"{name}() has not returned for {limit_s:g} s") from None
 
 
 class _Bounded:
@@ -153,6 +157,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         try:
             with self._control:
                 self._describe()
+                _require_usable(self._capabilities, self.factory)
                 self._apply(self._capabilities.nearest(Sequence()))
         except BaseException:
             self._give_back()
@@ -206,7 +211,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
 
     def _silence(self) -> str:
         """Say what came in place of frames."""
-        return "nothing"
+        return "nothing since it was opened"
 
     # --- state -------------------------------------------------------------------------------
 
@@ -214,7 +219,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         """Return what is known here, and what the device answers."""
         with self._control:
             self._require_connected()
-            temperature_c = self._asked(self._temperature_c)
+            temperature_c = finite(self._asked(self._temperature_c))
             return self._status(light_on=self._lit, temperature_c=temperature_c)
 
     # --- sequence and light ------------------------------------------------------------------
@@ -311,9 +316,10 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
     def _taken(self, timeout_s: float) -> _A | None:
         try:
             return self._take(timeout_s)
-        except CameraLost:
+        except CameraLost as error:
             with self._control:
                 self._require_open()  # closed by another thread: no loss
+                self._loss = error.reason
                 self._lose()
             raise
 
@@ -343,9 +349,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
                 self._check()
             finally:
                 self._lose()
-        raise CameraLost(
-            f"no whole frame within {self._silence_s:g} s ({self._silence()} since it was opened)"
-        )
+        raise CameraLost(f"no whole frame within {self._silence_s:g} s ({self._silence()})")
 
     def _watch(self, unread_s: float) -> None:
         """Switch the light off without readers; the next `read_frame` needs it again."""
@@ -395,9 +399,19 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         """Return the answer to requests; a loss disconnects the camera."""
         try:
             return request()
-        except CameraLost:
+        except CameraLost as error:
+            self._loss = error.reason
             self._lose()
             raise
+
+
+def _require_usable(about: Capabilities, factory: object) -> None:
+    """Refuse what a package states of its camera that nothing could be done with."""
+    require_stated(about)
+    require_image(about.width, about.height, about.bits)
+    require("factory", isinstance(factory, FactoryCalibration | None), "a calibration", factory)
+    if factory is not None:
+        require_stated(factory)
 
 
 def _left_open(device: _Device) -> None:

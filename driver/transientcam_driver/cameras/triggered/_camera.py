@@ -16,6 +16,7 @@ from transientcam_driver.camera import (
     FactoryCalibration,
     RawFrame,
     Simulation,
+    finite,
 )
 from transientcam_driver.cameras.streamed import StreamedCamera, same
 from transientcam_driver.cameras.triggered._device import Group, Images, TriggeredDevice
@@ -26,6 +27,8 @@ from transientcam_supervisor import OffSwitch
 
 _LOSSES: Final = 5
 """Losses in a row from which on the camera counts as lost, with the reason."""
+_HIGHEST_DN: Final = 65535
+_LONGEST_SETTLING_S: Final = 60.0
 _SHORTEST_S: Final = 1e-9  # where the clock does not move meanwhile
 
 
@@ -59,7 +62,13 @@ class PartialFrame:
         return not self._left
 
     def store(self, images: Images) -> None:
-        """Take the images of the next group."""
+        """Take the images of the next group. Raises ValueError where they are no such ones."""
+        images = np.asarray(images)
+        wanted = len(self._left[0]), *self.images.shape[1:]
+        if images.shape != wanted or images.dtype.kind not in "buif":
+            raise ValueError(f"{images.shape} of {images.dtype}; allowed: {wanted} of uint16")
+        if images.dtype != np.uint16 and not (images.min() >= 0 and images.max() <= _HIGHEST_DN):
+            raise ValueError(f"values beyond 0 to {_HIGHEST_DN}")
         self.images[[label.index for label in self._left[0]]] = images
         self._left.pop(0)
         self.settled_s, self.exposing = None, False
@@ -185,7 +194,7 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
                 return None
             partial, end_s = self._partial, self._clock.now_s() + timeout_s
             if partial.settled_s is None:
-                settles_s = self._asked(lambda: self._device.prepare(partial.next_group))
+                settles_s = self._asked(lambda: self._prepared(partial.next_group))
                 partial.settled_s = self._clock.now_s() + settles_s
             now_s = self._clock.now_s()
             if now_s < partial.settled_s:
@@ -198,6 +207,14 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
                 self._asked(lambda: self._device.trigger(partial.next_group))
                 partial.exposing = True
             return partial
+
+    def _prepared(self, group: Group) -> float:
+        found = self._device.prepare(group)
+        settles_s = finite(found)
+        if settles_s is None or not 0 <= settles_s <= _LONGEST_SETTLING_S:
+            limit = f"no number of seconds from 0 to {_LONGEST_SETTLING_S:g}"
+            raise CameraLost(f"prepare() returned {found!r:.60}, {limit}")
+        return settles_s
 
     def _collected(self, arrival: _Arrival) -> RawFrame | None:
         partial, images = arrival
@@ -238,7 +255,7 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
             device_time_s=partial.begun_s - self._since_s,
             host_time_s=self._clock.unix_s(),
             capture_s=max(self._clock.now_s() - partial.begun_s, _SHORTEST_S),
-            temperature_c=self._asked(self._device.temperature_c),
+            temperature_c=finite(self._asked(self._device.temperature_c)),
             lost_images=self._lost,
         )
         self._lost = 0

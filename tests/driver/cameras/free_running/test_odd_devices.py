@@ -14,6 +14,7 @@ from transientcam_driver import (
     Capture,
     Description,
     Exposure,
+    FrameTimeout,
     FreeRunningCamera,
     Moment,
     Sequence,
@@ -108,8 +109,11 @@ def read() -> Iterator[_Read]:
         Capture([image("a", dtype="U1")] * 4, 1, 0.001),
         Capture([[[1, 2, 3], [1, 2]]] * 4, 1, 0.001),  # type: ignore[list-item]  # ragged
         Capture([image()] * 4, 1, math.nan),
+        Capture([image()] * 4, 1, "noon"),  # type: ignore[arg-type]
+        Capture([image()] * 4, 1, 1.7e18),
+        Capture([image()] * 4, 1, 0.001, None, math.nan),
     ],
-    ids=["too few", "turned", "complex", "text", "ragged", "no time"],
+    ids=["few", "turned", "complex", "text", "ragged", "no time", "words", "in ns", "no length"],
 )
 def test_a_frame_that_does_not_fit_costs_that_frame_alone(read: _Read, bad: Capture) -> None:
     camera = read([good(0), bad, good(2)])
@@ -134,6 +138,41 @@ def test_a_device_whose_frames_never_fit_is_lost_with_the_reason() -> None:
         camera.read_frame(timeout_s=60.0)
 
     camera.close()
+
+
+def test_a_camera_of_few_frames_is_waited_for() -> None:
+    device = Device(replace(ABOUT, frame_rate_hz=1.0), [good(0)])
+    camera = FreeRunningCamera(lambda: device, silence_s=0.1, unread_s=600.0)
+    camera.start()
+    with pytest.raises(FrameTimeout):
+        camera.read_frame(timeout_s=0.3)
+    device.wanted.release()
+    assert camera.read_frame(timeout_s=60.0).number == 0
+    camera.close()
+
+
+def test_a_receive_that_ends_its_thread_is_said() -> None:
+    class Ends(Device):
+        def receive(self, timeout_s: float) -> Capture | None:
+            raise SystemExit(3)
+
+    camera = FreeRunningCamera(lambda: Ends(ABOUT, []), silence_s=60.0)
+    camera.start()
+    with pytest.raises(CameraLost, match=r"receive\(\) raised SystemExit\(3\)"):
+        camera.read_frame(timeout_s=60.0)
+    camera.close()
+
+
+def test_a_pixel_that_lacks_one_moment_is_spoilt_and_one_without_any_is_dark(read: _Read) -> None:
+    about = replace(ABOUT, measurements=(Moment(20e6, 0.01, 2.0), Moment(100e6, 0.01, 2.0)))
+    moments = [image(1 + 1j, dtype=complex) for _ in range(2)]
+    moments[0][0, 0] = moments[1][0, 0] = moments[0][1, 1] = math.nan
+
+    found = read([Capture(moments, 0, 0.0)], about).read_frame(timeout_s=60.0).images
+
+    assert (found[:, 0, 0] == 32768).all()
+    assert (found[:4, 1, 1] == 65535).all()
+    assert (found[4:, 1, 1] == found[4:, 0, 1]).all()
 
 
 def test_a_receive_that_hangs_is_left_behind_and_said() -> None:

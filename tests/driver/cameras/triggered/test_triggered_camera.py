@@ -1,14 +1,22 @@
 """Cameras that expose on request: order, settling, losses, and no unrequested light."""
 
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 from unittest import mock
 
 import numpy as np
 import pytest
 
-from tests.driver.cameras.triggered.scripted import EXPOSED_S, SETTLES_S, Cable, ScriptedDevice
+from tests.driver.cameras.triggered.scripted import (
+    CAPABILITIES,
+    EXPOSED_S,
+    SETTLES_S,
+    Cable,
+    ScriptedDevice,
+)
 from transientcam_driver import (
     CameraLost,
     CameraNotFound,
@@ -16,7 +24,9 @@ from transientcam_driver import (
     FactoryCalibration,
     FrameTimeout,
     ImageLabel,
+    Lens,
     NotStreaming,
+    ProtocolError,
     Sequence,
     SubPhases,
 )
@@ -169,7 +179,11 @@ ODD: dict[str, object] = {}
 @pytest.mark.parametrize(
     ("returned", "reason"),
     [
-        (lambda: np.zeros((4, 2, 2), np.uint16), "5 times in a row .* does not fit: shape"),
+        (lambda: np.zeros((4, 2, 2), np.uint16), r"5 times in a row .* does not fit: \(4, 2, 2\)"),
+        (lambda: 7, r"does not fit: \(\) of int64; allowed: \(4, 3, 4\) of uint16"),
+        (lambda: np.zeros((4, 3, 4), complex), "does not fit: .* of complex128"),
+        (lambda: np.full((4, 3, 4), np.nan), "values beyond 0 to 65535"),
+        (lambda: np.full((4, 3, 4), -1), "values beyond 0 to 65535"),
         (lambda: ODD["lut"], r"receive\(\) raised KeyError\('lut'\)"),
     ],
 )
@@ -203,7 +217,7 @@ def test_a_call_that_hangs_is_left_behind_and_the_camera_comes_back(
                     call, camera.read_frame
                 )()
             assert camera.state == CameraState.DISCONNECTED
-            with pytest.raises(CameraLost, match="disconnected"):
+            with pytest.raises(CameraLost, match=rf"{call}\(\) has not returned"):
                 camera.status()
         ends.set()
         camera.reconnect()
@@ -224,9 +238,56 @@ def test_a_simulated_device_takes_as_long_as_it_is_computed(
     monkeypatch.setattr(streamed, "HANGS_S", 0.02)
     monkeypatch.setattr(ScriptedDevice, "prepare", slowly)
     simulation = mock.create_autospec(Simulation, instance=True)
+    simulation.lens.return_value = Lens(1.0, 1.0, 0.0, 0.0)
     with Cable().camera(simulation) as camera:
         camera.start()
         assert camera.read_frame().images.shape
+
+
+@pytest.mark.parametrize("settles_s", [None, "soon", float("nan"), float("inf"), -1.0])
+def test_what_is_no_time_to_settle_is_a_loss_that_says_so(
+    monkeypatch: pytest.MonkeyPatch, settles_s: object
+) -> None:
+    monkeypatch.setattr(ScriptedDevice, "prepare", lambda self, _: settles_s)
+    with Cable().camera() as camera:
+        camera.start()
+        with pytest.raises(CameraLost, match=rf"prepare\(\) returned {settles_s!r}, no number"):
+            camera.read_frame()
+
+
+def test_a_call_that_ends_the_program_ends_the_camera_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with Cable().camera() as camera:
+        monkeypatch.setattr(ScriptedDevice, "temperature_c", lambda self: sys.exit(3))
+        with pytest.raises(CameraLost, match=r"temperature_c\(\) raised SystemExit\(3\)"):
+            camera.status()
+
+
+@pytest.mark.parametrize(
+    ("stated", "refused"),
+    [
+        ({"width": 4.0}, "width is 4.0; allowed: a whole number"),
+        ({"height": 5000}, "height is 5000; allowed: 1 to 4096 pixels"),
+        ({"serial": "S\x001"}, r"serial is 'S\\x001'; allowed: a printable text"),
+        ({"readout_s": float("nan")}, "readout_s is nan; allowed: a finite number"),
+        ({"clock": "sundial"}, "clock is 'sundial'; allowed: device or ptp"),
+    ],
+)
+def test_what_a_device_cannot_be_is_refused_by_name(
+    monkeypatch: pytest.MonkeyPatch, stated: dict[str, Any], refused: str
+) -> None:
+    monkeypatch.setattr(ScriptedDevice, "capabilities", replace(CAPABILITIES, **stated))
+
+    with pytest.raises(ProtocolError, match=refused):
+        Cable().camera()
+
+
+def test_a_temperature_that_is_no_number_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Cable().camera() as camera:
+        for answer in ("warm", float("nan")):
+            monkeypatch.setattr(ScriptedDevice, "temperature_c", lambda self, it=answer: it)
+            assert camera.status().temperature_c is None
 
 
 def test_what_any_call_raises_is_a_loss_with_its_name(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -50,7 +50,7 @@ export function ResponseView() {
   const frame = store.frames.of(obstacle === undefined ? "coefficients" : "range");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
   // The curves wait for what the service says of the same frame.
-  const looked = useComputed(() => store.details.frame.value ?? frame.value);
+  const looked = useComputedOf([store, frame], () => store.details.frame.value ?? frame.value);
   useEffect(() => selectFirst(store, frame), [store, frame]);
   const side = store.settings.of(SIDE);
   const shown = useComputedOf([looked, store], () => {
@@ -65,8 +65,10 @@ export function ResponseView() {
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
   const logarithmic = store.settings.of(LOGARITHMIC);
   const pointed = useSignal("");
-  const pixel = useComputed(() => (absent.value.coefficients === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
-  const frameless = useComputed(() => frame.value === null);
+  const pixel = useComputedOf([shown], () =>
+    absent.value.coefficients === undefined ? (shown.value?.pixel ?? null) : store.selected.value,
+  );
+  const frameless = useComputedOf([frame], () => frame.value === null);
   const place = useComputed(() => (pixel.value === null ? null : `${pixel.value.x}, ${pixel.value.y}`));
   const download = (aspect: Aspect) => (): void => {
     const now = shown.peek();
@@ -98,12 +100,16 @@ export function ResponseView() {
       }
     >
       <div class="response grow spaced">
-        {frameless.value ? <FirstFrame /> : place.value === null && <p class="stage-empty cover">Click a pixel in one of the pictures.</p>}
-        {place.value === null ? null : obstacle !== undefined ? (
+        {obstacle !== undefined ? null : frameless.value ? (
+          <FirstFrame />
+        ) : (
+          place.value === null && <p class="stage-empty cover">Click a pixel in one of the pictures.</p>
+        )}
+        {obstacle !== undefined ? (
           <p class="absent" data-field="absent">
             This camera has no density of light over time: {obstacle}.
           </p>
-        ) : side.value === "moments" ? (
+        ) : place.value === null ? null : side.value === "moments" ? (
           <MomentsPlane pixel={levinson} />
         ) : (
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />

@@ -1,7 +1,7 @@
 import { engineering, fixed, numberOf } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { AppliedDocument, ChoiceDocument, PlanRequest } from "../../stream/documents";
-import { Button, Check, Form, NumberField } from "../../ui/controls";
+import { Button, Check, Choice, Form, NumberField } from "../../ui/controls";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -28,6 +28,7 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
   const judged = tradeoff !== null && tradeoff.current.meta.sequence_id === applied.sequence_id && !accuracy.outdated.value;
   const truth_m = judged ? (tradeoff.current.range_error_m?.median ?? null) : null;
   const looked = accuracy.looked.value;
+  const others = accuracy.others.value;
   const busy = accuracy.job.value !== null || task.busy.value !== null;
   const look = (choice: ChoiceDocument): void => void (accuracy.looked.value = choice);
   const apply = async (): Promise<void> => {
@@ -60,6 +61,14 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
         {looked !== null && <PriceBar choice={looked} />}
         <PlannedMap />
+        {others.length > 0 && (
+          <Choice
+            label="Planned with"
+            chosen={accuracy.estimator}
+            of={["", ...others.map(({ name }) => name)]}
+            text={(chosen) => others.find(({ name }) => name === chosen)?.label ?? "the best of our estimators"}
+          />
+        )}
         <details class="accuracy-goal">
           <summary>Plan for a target</summary>
           <GoalForm disabled={busy} onGoal={(goal) => void accuracy.plan(goal)} />
