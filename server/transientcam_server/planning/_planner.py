@@ -12,10 +12,11 @@ from scipy.ndimage import uniform_filter
 import transientcam_moments as tm
 from transientcam.notebook import palette
 from transientcam_driver import Camera, Capabilities, Sequence, Truth
+from transientcam_server.imaging import Gains
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._prediction.timing import timer_of
 from transientcam_server.planning._process.queue import Progress
-from transientcam_server.planning._scene.look import STEPS, look_at
+from transientcam_server.planning._scene.look import STEPS, capture_look
 from transientcam_server.planning._scene.scene import SceneStatistics
 from transientcam_server.planning._search.families import Family, Goal, families, require_plannable
 from transientcam_server.planning._search.plan import Plan, plan
@@ -90,17 +91,30 @@ class Planner:
         calibrated_c: float | None = None,
         progress: Progress | None = None,
     ) -> SceneStatistics:
-        """Look at the scene before a camera; see `look_at`."""
+        """Look at the scene before a camera; see `capture_look`."""
+        return self.capture_look(camera, base, ambient_dn_per_s, calibrated_c, progress)()
+
+    def capture_look(
+        self,
+        camera: Camera,
+        base: Sequence,
+        ambient_dn_per_s: float | None,
+        calibrated_c: float | None,
+        progress: Progress | None = None,
+        in_use: Gains | None = None,
+    ) -> Callable[[], SceneStatistics]:
+        """Capture a look, and return what describes the scene: seconds without the camera."""
         shown = progress or Progress()
         done = itertools.count()
 
-        return look_at(
+        return capture_look(
             camera,
             self._sensor,
             self._settings,
             base=base,
             ambient_dn_per_s=ambient_dn_per_s,
             calibrated_c=calibrated_c,
+            in_use=in_use,
             go_on=lambda stage: shown.at(min(next(done) / STEPS, 1.0), stage),
         )
 

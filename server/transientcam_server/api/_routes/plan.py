@@ -8,8 +8,8 @@ from fastapi import APIRouter, Request, Response, status
 from transientcam_driver import Sequence
 from transientcam_server.api import _planned as planned
 from transientcam_server.api._auth import Role
-from transientcam_server.api._auth.permissions import needs
-from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._auth.permissions import TO_LIGHT, needs, require
+from transientcam_server.api._dependencies import OffsOf, ServiceOf
 from transientcam_server.api._documents.job import JobDocument
 from transientcam_server.api._documents.plan import PlanDocument, PlanRequest
 from transientcam_server.api._job_answers import ACCEPTED
@@ -29,37 +29,46 @@ from transientcam_server.service import Service
 router = APIRouter(tags=["accuracy"])
 KIND: Final = "plan"
 """Of the jobs that make a plan."""
+_REFUSALS: Final = (
+    *(*planned.REFUSALS, kinds.INVALID_SEQUENCE),
+    *(kinds.ROLE_TOO_LOW, kinds.MAY_NOT_LIGHT, kinds.LEASE_HELD, kinds.LEASE_LOST),
+    *(kinds.CAMERA_BUSY, kinds.RECORDING_RUNS, kinds.START_OUTDATED),
+)
+"""The lower ones are those of a look."""
 
 
 @router.post(
     "/plan",
     summary="A sequence for a target accuracy or a budget of time",
-    responses=documented(*planned.REFUSALS, kinds.INVALID_SEQUENCE),
+    responses=documented(*_REFUSALS),
 )
 @needs(Role.VIEWER, lease=False)
-async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> PlanDocument:
+async def make_plan(
+    service: ServiceOf, request: PlanRequest, http: Request, offs: OffsOf
+) -> PlanDocument:
     """Recommend a sequence and an estimator with predicted accuracy, and neighbours.
 
     With targets it is the quickest one that reaches all of them with margin within the budgets;
     with budgets alone the most accurate one within them. Where no scene is given it is looked at:
     before a simulated camera by another one in virtual time, at all frequencies; before any other
-    by the current frame, and the plan cannot consider what that does not resolve. A camera of fixed
-    frequencies is refused; `takes` of the problem says what more of them give. Nothing is changed:
-    `sequence` of the answer is the body for a `PUT /sequence`. A client that leaves ends the work;
-    `POST /plan/jobs` reports its progress.
+    by the current frame, and the plan cannot consider what that does not resolve, or with `look` by
+    the camera itself at all frequencies, under the lease: no frames for some seconds. A camera of
+    fixed frequencies is refused; `takes` of the problem says what more of them give. Nothing is
+    changed: `sequence` of the answer is the body for a `PUT /sequence`. A client that leaves ends
+    the work; `POST /plan/jobs` reports its progress.
     """
-    return await planned.for_request(http, await _work(service, request, http))
+    return await planned.for_request(http, await _work(service, request, http, offs))
 
 
 @router.post(
     "/plan/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Make a plan as a job, with progress",
-    responses=ACCEPTED | documented(*planned.REFUSALS, kinds.INVALID_SEQUENCE, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED | documented(*_REFUSALS, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_plan(
-    service: ServiceOf, request: PlanRequest, http: Request, response: Response
+    service: ServiceOf, request: PlanRequest, http: Request, response: Response, offs: OffsOf
 ) -> JobDocument:
     """Begin to make the plan that `POST /plan` answers with, which is the `result` of the job.
 
@@ -68,19 +77,32 @@ async def start_plan(
     `GET /jobs/{job}/map`.
     """
     files: dict[str, bytes] = {}
-    work = await _work(service, request, http, files)
+    work = await _work(service, request, http, offs, files)
     return planned.as_job(service, KIND, work, response, files)
 
 
 async def _work(
-    service: Service, request: PlanRequest, http: Request, files: dict[str, bytes] | None = None
+    service: Service,
+    request: PlanRequest,
+    http: Request,
+    offs: int,
+    files: dict[str, bytes] | None = None,
 ) -> planned.Work[PlanDocument]:
     """Return what makes the plan; a goal that cannot be meant or planned is refused at once."""
     await planned.require_plannable(service, planned.address_of(http))
     if request.scene is None:
         planned.require_scene(service)
+        if _by_camera(service, request):
+            require(http, service, TO_LIGHT)
+            service.require_no_recording("A look")
+            service.acquisition.require_free()
     goal, address = _goal(service, request), planned.address_of(http)
-    return partial(_made, service, request, goal, address, files)
+    return partial(_made, service, request, goal, address, offs, files)
+
+
+def _by_camera(service: Service, request: PlanRequest) -> bool:
+    """Return whether the camera itself is to look, which is not that of a relay."""
+    return request.look and service.looks.needs_frame and service.relay is None
 
 
 def _goal(service: Service, request: PlanRequest) -> Goal:
@@ -106,6 +128,7 @@ async def _made(
     request: PlanRequest,
     goal: Goal,
     address: str,
+    offs: int,
     files: dict[str, bytes] | None,
     progress: Progress,
 ) -> PlanDocument:
@@ -113,7 +136,8 @@ async def _made(
     into = files if request.map else None
     searched = 1.0 if into is None else 0.8
     async with service.planning.place_of(address):
-        scene = await _scene(service, request, goal.base, progress.part(0.0, planned.LOOKED))
+        looking = progress.part(0.0, planned.LOOKED)
+        scene = await _scene(service, request, goal.base, offs, looking)
         made = await service.planning.run(
             service.planner.plan_document,
             goal,
@@ -143,7 +167,7 @@ def _add_transport(price: dict[str, Any], frame: Frame | None) -> None:
 
 
 async def _scene(
-    service: Service, request: PlanRequest, base: Sequence, progress: Progress
+    service: Service, request: PlanRequest, base: Sequence, offs: int, progress: Progress
 ) -> SceneStatistics:
     scene = request.scene
     if scene is not None:
@@ -152,6 +176,10 @@ async def _scene(
             [(each.range_m, each.weight) for each in scene.returns],
             ambient_dn_per_s=scene.ambient_dn_per_s,
         )
+    if _by_camera(service, request):
+        occupy = partial(service.acquisition.occupy, "look", offs=offs)
+        recipe = service.pipeline.recipe_of(service.applied)
+        return await service.looks.of_camera(occupy, recipe, request.ambient_dn_per_s, progress)
     if service.looks.needs_frame:
         frame = await service.hub.newest(after=0, wait_s=planned.FRAME_WITHIN_S)
         return await service.looks.of_frame(frame, request.ambient_dn_per_s)

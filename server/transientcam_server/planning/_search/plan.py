@@ -79,10 +79,13 @@ _CLEARLY_LESS: Final = 0.8
 """Share of the best error that what is dearer has to stay below to be named."""
 
 
-def refusal(goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False) -> Problem:
+def refusal(
+    goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False, calibrated: bool = True
+) -> Problem:
     """Return the problem ``target-unreachable`` of what falls short of a goal.
 
     A frame of another purpose, in the place of a look, decides nothing: a capture may do better.
+    Nor does a look without a calibration: what the camera does is taken for the scene's.
     """
     field, best = shortfall.field, shortfall.best
     limit, achieved = getattr(goal, field), _achieved(best, field)
@@ -93,13 +96,16 @@ def refusal(goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False) -> 
         of_share = f" in {goal.share:.0%} of the pixels"
     if field.startswith("range") and achieved <= limit:
         margin = ", which leaves no margin"
-    decided = not (of_one_frame and field.startswith("range"))
+    decided = (calibrated and not of_one_frame) or not field.startswith("range")
+    witness, better = "a look without a calibration", "a calibrated camera"
+    if of_one_frame:
+        witness, better = "one frame", "a look at all frequencies"
     verdict = (
         f"This cannot be reached on this scene: {field} = {limit:g}{of_share}. "
         f"The best {named} is {achieved:.4g}{margin}."
         if decided
-        else f"Whether this can be reached one frame does not tell: {field} = {limit:g}{of_share}. "
-        f"By it the best {named} is {achieved:.4g}; a look at all frequencies may find less."
+        else f"Whether this can be reached {witness} does not tell: {field} = {limit:g}{of_share}. "
+        f"By it the best {named} is {achieved:.4g}; {better} may find less."
     )
     return Problem(
         kinds.TARGET_UNREACHABLE,
@@ -387,7 +393,8 @@ def plan(
     best = best_choice(candidates, targets, leading)
     if best is None or best.relative_errors(targets)[1] > 1:
         missed = shortfall(goal, best, candidates, unlimited)
-        raise refusal(goal, missed, of_one_frame=predictor.scene.of_one_frame)
+        seen = predictor.scene
+        raise refusal(goal, missed, of_one_frame=seen.of_one_frame, calibrated=seen.calibrated)
     progress.at(0.7, "half the time")
     best, half_time = shortened(best, candidates, targets, leading)
     progress.at(0.8, "twice the accuracy")
