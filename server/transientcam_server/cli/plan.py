@@ -92,14 +92,6 @@ def plan(
             help="Let a daemon plan, for the scene before its camera, which goes on capturing.",
         ),
     ] = None,
-    look: Annotated[
-        bool,
-        typer.Option(
-            "--look",
-            help="With --daemon: let a camera that is not simulated look at all frequencies, some "
-            "seconds without other frames, in place of its current frame.",
-        ),
-    ] = False,
     front: Annotated[
         bool, typer.Option("--front", help="Return the whole Pareto front instead of one sequence.")
     ] = False,
@@ -140,7 +132,7 @@ def plan(
     budget |= {"computing_share": computing_share}
     stays = _fields(fixed or [])
     if front:
-        goal_of_one = {"--fix": fixed or None, "--map": map_file, "--look": look or None}
+        goal_of_one = {"--fix": fixed or None, "--map": map_file}
         _refuse(
             goal_of_one | _options(target) | _options(budget),
             "is for one sequence, and --front shows all that no other beats",
@@ -159,7 +151,7 @@ def plan(
         if not front:
             target |= {"separation_share": separation_share} if separation_m else {}
             wanted |= {"target": _given(target), "budget": _given(budget), "fixed": stays}
-            wanted |= {"map": map_file is not None, "look": look}
+            wanted |= {"map": map_file is not None}
         make = partial(_by_daemon, daemon, token, wanted, map_file)
     else:
         from transientcam_server.cli.plan_here import View, by_camera

@@ -16,9 +16,6 @@ from transientcam_server.planning._scene.scene import SceneStatistics
 
 CACHED_S: Final = 10.0
 _ASK_EVERY_S: Final = 0.1
-_Described = Callable[[], SceneStatistics]
-Occupy = Callable[[Callable[[Camera, Callable[[], None]], _Described]], "Future[_Described]"]
-"""Lends the camera to what is given, as `Acquisition.occupy` does."""
 
 
 class CameraTwin(Protocol):
@@ -93,21 +90,26 @@ class Looks:
         return scene
 
     async def of_camera(
-        self, occupy: Occupy, recipe: Recipe, ambient_dn_per_s: float | None, progress: Progress
+        self,
+        occupy: Callable[..., "Future[Any]"],
+        recipe: Recipe,
+        ambient_dn_per_s: float | None,
+        progress: Progress,
     ) -> SceneStatistics:
-        """Return the scene by the camera itself, which ``occupy`` lends for the captures.
+        """Return the scene by the camera itself, lent as `Acquisition.occupy` does.
 
         ``recipe``: Of its frames, with the gains that fit their sequence.
-        Raises Problem, CameraError and JobCancelled as these do.
         """
-        self._planner.require_possible()
-        about = recipe.applied.sequence, ambient_dn_per_s, self._calibrated_c(), progress
+        how: dict[str, Any]
+        how = {"ambient_dn_per_s": ambient_dn_per_s, "calibrated_c": self._calibrated_c()}
+        how |= {"in_use": recipe.gains, "progress": progress}
 
-        def captured(camera: Camera, go_on: Callable[[], None]) -> _Described:
+        def captured(camera: Camera, go_on: Callable[[], None]) -> Callable[[], SceneStatistics]:
             asking: Any = _Asking(camera, go_on)
-            return self._planner.capture_look(asking, *about, recipe.gains)
+            return self._planner.capture_look(asking, recipe.applied.sequence, **how)
 
         described = await asyncio.wrap_future(occupy(captured))
+        scene: SceneStatistics
         scene, _ = await self._workers.run_long(described)
         return scene
 

@@ -51,8 +51,6 @@ FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
 """Factor between steps of noise."""
-MOST_DEVIATIONS: Final = 3.0
-"""What noise of the look adds to a bias, at most."""
 SWING: Final = 0.25
 """Error of a range that changes evenly during a capture, over that change."""
 OUTVOTED: Final = 3
@@ -202,7 +200,7 @@ class Predictor:
         """Bias in m that no exposure and no takes reduce."""
         self._go_on()
         scene = self.scene
-        if scene.again:
+        if scene.again:  # whose noise would be in it
             return 0.0
         b = scene.relative_moments(harmonics, base_frequency_hz)[:, FEW]
         variance = np.broadcast_to((self._nominal[FEW] * STEP**-4) ** 2, b.shape).astype(np.float32)
@@ -438,31 +436,26 @@ class Predictor:
         if not self.scene.again:
             return errors
         return self._without_noise_of_look(
-            errors, estimator, harmonics, base_frequency_hz, variance, errors.std_m / left, pixels
+            errors, (estimator, harmonics, base_frequency_hz), variance, pixels
         )
 
     def _without_noise_of_look(
-        self, errors: PixelErrors, estimator: str, harmonics: int, base_frequency_hz: float,
-        variance: _Array, amplification_m: _Array, pixels: slice,
-    ) -> PixelErrors:  # fmt: skip
-        """Return errors whose bias has no noise of the look in it, which pixels alike share.
+        self, errors: PixelErrors, how: tuple[str, int, float], variance: _Array, pixels: slice
+    ) -> PixelErrors:
+        """Return errors whose bias has no noise of the look in it, by what pixels alike share.
 
-        What noise adds to the square of the bias it adds once more to that of what was seen with
-        noise: extrapolated to none (Cook and Stefanski 1994), and limited to what noise can do.
-        ``variance``: (m + 1, P) that the estimator is told.
-        ``amplification_m``: (P) deviation of the range over that of the moments.
+        What noise adds to the square of a bias it adds once more to that of what was seen with more
+        noise: extrapolated to none (Cook and Stefanski 1994). No pixel counts for many.
         """
-        scene, squares = self.scene, []
+        scene, squares, (estimator, harmonics, base_hz) = self.scene, [], how
         for each in (scene, *(replace(scene, **drawn) for drawn in scene.again)):
-            b = each.relative_moments(harmonics, base_frequency_hz)[:, pixels]
-            range_m = ranges_m(b, variance, estimator, base_frequency_hz, self.settings)
+            b = each.relative_moments(harmonics, base_hz)[:, pixels]
+            range_m = ranges_m(b, variance, estimator, base_hz, self.settings)
             off_m = np.hypot(range_m - each.direct_m[pixels], each.uncertainty_m[pixels])
             squares.append(np.nan_to_num(off_m) ** 2)
-        assert scene.relative_noise is not None  # noqa: S101 - it was looked at
-        most = (MOST_DEVIATIONS * amplification_m * scene.relative_noise[pixels]) ** 2
-        added = np.clip(np.mean(squares[1:], axis=0) - squares[0], None, most)
-        here, noise = (uniform_filter1d(each, STRATUM) for each in (squares[0], added))
-        left = np.sqrt(np.clip(1 - noise / np.maximum(here, 1e-18), 0.0, 1.0))
+        here = np.maximum(uniform_filter1d(squares[0], STRATUM), 1e-18)
+        noise = np.minimum(np.mean(squares[1:], axis=0) - squares[0], here)
+        left = np.sqrt(np.clip(1 - uniform_filter1d(noise, STRATUM) / here, 0.0, 1.0))
         left = np.where(np.isfinite(errors.bias_m), left, 1.0)
         centre_m = errors.centre_m - (1 - left) * errors.signed_m
         return replace(errors, bias_m=left * errors.bias_m, centre_m=centre_m)

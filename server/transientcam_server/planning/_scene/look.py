@@ -272,16 +272,19 @@ def capture_look(
     moves = not _still(fine)
     if moves:
         quick.append(captured(quick_sequence, 2, "motion").averages())
-    arguments: dict[str, Any] = {
-        "coarse": coarse.averages(),
-        "ambient_dn_per_s": ambient_dn_per_s,
-        "gain_noise": 0.0 if gains is None else TAKES / CALIBRATION_TAKES,
-        "quick": quick if moves else (),
-    }
+    gain_noise = 0.0 if gains is None else TAKES / CALIBRATION_TAKES
+    of_motion = quick if moves else ()
 
     def described() -> SceneStatistics:
         go_on("direct range")
-        scene = describe(fine, settings, **arguments)
+        scene = describe(
+            fine,
+            settings,
+            coarse=coarse.averages(),
+            ambient_dn_per_s=ambient_dn_per_s,
+            gain_noise=gain_noise,
+            quick=of_motion,
+        )
         if scene is None:
             raise no_light()
         drift_m = _drift_m(calibrated_c, fine.temperature_c)

@@ -168,10 +168,10 @@ function GoalForm({ disabled, onGoal }: { disabled: boolean; onGoal: (goal: Plan
       {real && (
         <Check
           checked={look.value}
-          title="At all frequencies, by the camera itself; else by the current frame alone"
+          title="At all frequencies; else by the current frame alone"
           onChange={(checked) => (look.value = checked)}
         >
-          look first: some seconds without frames
+          look first, some seconds without frames
         </Check>
       )}
       <Button type="submit" disabled={disabled || !sensible}>
