@@ -51,6 +51,8 @@ FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
 """Factor between steps of noise."""
+OUTLYING: Final = 4.0
+"""What noise of the look adds to one pixel, over what those alike have, at most."""
 SWING: Final = 0.25
 """Error of a range that changes evenly during a capture, over that change."""
 OUTVOTED: Final = 3
@@ -445,7 +447,7 @@ class Predictor:
         """Return errors whose bias has no noise of the look in it, by what pixels alike share.
 
         What noise adds to the square of a bias it adds once more to that of what was seen with more
-        noise: extrapolated to none (Cook and Stefanski 1994). No pixel counts for many.
+        noise: extrapolated to none (Cook and Stefanski 1994).
         """
         scene, squares, (estimator, harmonics, base_hz) = self.scene, [], how
         for each in (scene, *(replace(scene, **drawn) for drawn in scene.again)):
@@ -454,7 +456,7 @@ class Predictor:
             off_m = np.hypot(range_m - each.direct_m[pixels], each.uncertainty_m[pixels])
             squares.append(np.nan_to_num(off_m) ** 2)
         here = np.maximum(uniform_filter1d(squares[0], STRATUM), 1e-18)
-        noise = np.minimum(np.mean(squares[1:], axis=0) - squares[0], here)
+        noise = np.minimum(np.mean(squares[1:], axis=0) - squares[0], OUTLYING * here)
         left = np.sqrt(np.clip(1 - uniform_filter1d(noise, STRATUM) / here, 0.0, 1.0))
         left = np.where(np.isfinite(errors.bias_m), left, 1.0)
         centre_m = errors.centre_m - (1 - left) * errors.signed_m
