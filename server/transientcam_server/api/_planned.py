@@ -12,8 +12,8 @@ import transientcam_moments as tm
 from transientcam_server.api._documents.document import Document
 from transientcam_server.api._documents.job import JobDocument
 from transientcam_server.api._job_answers import accepted
-from transientcam_server.camera import Job
-from transientcam_server.errors import Problem, kinds
+from transientcam_server.camera import Job, outdated
+from transientcam_server.errors import JobCancelled, Problem, kinds
 from transientcam_server.imaging import unusable
 from transientcam_server.planning import Progress, families, takes_of
 from transientcam_server.service import Service
@@ -40,7 +40,7 @@ Work = Callable[[Progress], Coroutine[Any, Any, _Answer]]
 
 
 async def for_request(http: Request, work: Work[_Answer]) -> _Answer:
-    """Return what the work answers with; a client that leaves ends it."""
+    """Return what the work answers with; a client that leaves, or light that goes off, ends it."""
     left = threading.Event()
 
     def go_on(share: float, step: str) -> None:
@@ -53,6 +53,8 @@ async def for_request(http: Request, work: Work[_Answer]) -> _Answer:
 
     try:
         return await _ended(work(Progress(go_on)), ask)
+    except JobCancelled as ended:
+        raise outdated() from ended
     finally:
         left.set()
 

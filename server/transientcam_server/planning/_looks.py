@@ -3,17 +3,19 @@
 import asyncio
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import AbstractContextManager
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
-from transientcam_driver import Camera, Sequence
-from transientcam_server.imaging import Frame, Workers
+from transientcam_driver import Camera, FrameTimeout, RawFrame, Sequence
+from transientcam_server.imaging import Frame, Recipe, Workers
 from transientcam_server.planning._planner import Planner
 from transientcam_server.planning._process.queue import PlanningQueue, Progress
 from transientcam_server.planning._scene.look import look_of_frame
 from transientcam_server.planning._scene.scene import SceneStatistics
 
 CACHED_S: Final = 10.0
+_ASK_EVERY_S: Final = 0.1
 
 
 class CameraTwin(Protocol):
@@ -28,7 +30,8 @@ class Looks:
     """Looks at the present scene; on the event loop, computed elsewhere.
 
     A simulated camera has a twin that looks in its place, so that frames go on undisturbed and no
-    busy machine loses images. Of any other camera the current frame has to be enough.
+    busy machine loses images. Any other camera looks by itself, without frames for some seconds;
+    or the current frame has to be enough.
     ``calibrated_c`` returns the temperature of the camera at the calibration in use, if known.
     """
 
@@ -86,9 +89,54 @@ class Looks:
         )
         return scene
 
+    async def of_camera(
+        self,
+        occupy: Callable[..., "Future[Any]"],
+        recipe: Recipe,
+        ambient_dn_per_s: float | None,
+        progress: Progress,
+    ) -> SceneStatistics:
+        """Return the scene by the camera itself, lent as `Acquisition.occupy` does.
+
+        ``recipe``: Of its frames, with the gains that fit their sequence.
+        """
+        how: dict[str, Any]
+        how = {"ambient_dn_per_s": ambient_dn_per_s, "calibrated_c": self._calibrated_c()}
+        how |= {"in_use": recipe.gains, "progress": progress}
+
+        def captured(camera: Camera, go_on: Callable[[], None]) -> Callable[[], SceneStatistics]:
+            asking: Any = _Asking(camera, go_on)
+            return self._planner.capture_look(asking, recipe.applied.sequence, **how)
+
+        described = await asyncio.wrap_future(occupy(captured))
+        scene: SceneStatistics
+        scene, _ = await self._workers.run_long(described)
+        return scene
+
     def forget(self) -> None:
         """Drop what was seen, as when the scene is another one."""
         self._cached = None
+
+
+class _Asking:
+    """A camera that asks whether to go on while it waits for a frame."""
+
+    def __init__(self, camera: Camera, go_on: Callable[[], None]) -> None:
+        self._camera, self._go_on = camera, go_on
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._camera, name)
+
+    def read_frame(self, *, timeout_s: float) -> RawFrame:
+        """Return the next frame, as the camera does."""
+        until_s = time.monotonic() + timeout_s
+        while True:
+            self._go_on()
+            try:
+                return self._camera.read_frame(timeout_s=_ASK_EVERY_S)
+            except FrameTimeout:
+                if time.monotonic() > until_s:
+                    raise
 
 
 def look_through(

@@ -15,7 +15,7 @@ from transientcam_driver import Camera, Capabilities, Sequence, Truth
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._prediction.timing import timer_of
 from transientcam_server.planning._process.queue import Progress
-from transientcam_server.planning._scene.look import STEPS, look_at
+from transientcam_server.planning._scene.look import STEPS, capture_look
 from transientcam_server.planning._scene.scene import SceneStatistics
 from transientcam_server.planning._search.families import Family, Goal, families, require_plannable
 from transientcam_server.planning._search.plan import Plan, plan
@@ -81,28 +81,24 @@ class Planner:
         """Predict with other settings of the reconstruction from now on."""
         self._settings = settings
 
-    def look(
-        self,
-        camera: Camera,
-        base: Sequence,
-        *,
-        ambient_dn_per_s: float | None = None,
-        calibrated_c: float | None = None,
-        progress: Progress | None = None,
-    ) -> SceneStatistics:
-        """Look at the scene before a camera; see `look_at`."""
+    def look(self, camera: Camera, base: Sequence, **how: Any) -> SceneStatistics:
+        """Look at the scene before a camera; arguments as of `capture_look`."""
+        return self.capture_look(camera, base, **how)()
+
+    def capture_look(
+        self, camera: Camera, base: Sequence, *, progress: Progress | None = None, **how: Any
+    ) -> Callable[[], SceneStatistics]:
+        """Capture a look, and return what describes the scene: seconds without the camera.
+
+        ``how``: What is known of light and calibration, as `look.capture_look` has it.
+        """
         shown = progress or Progress()
         done = itertools.count()
 
-        return look_at(
-            camera,
-            self._sensor,
-            self._settings,
-            base=base,
-            ambient_dn_per_s=ambient_dn_per_s,
-            calibrated_c=calibrated_c,
-            go_on=lambda stage: shown.at(min(next(done) / STEPS, 1.0), stage),
-        )
+        def go_on(stage: str) -> None:
+            shown.at(min(next(done) / STEPS, 1.0), stage)
+
+        return capture_look(camera, self._sensor, self._settings, base=base, go_on=go_on, **how)
 
     def require_possible(self) -> None:
         """Refuse a camera whose captures are not predicted (Problem ``target-unreachable``)."""

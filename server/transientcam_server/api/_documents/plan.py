@@ -100,6 +100,9 @@ class PlanRequest(_StrictDocument):
     scene: SceneDocument | None = None
     """Null looks at the scene: by a simulated camera of its own in virtual time, or else by the
     current frame."""
+    look: bool = False
+    """Whether a camera that is not simulated looks at all frequencies, in place of the current
+    frame: some seconds without other frames. That takes the lease and the right to light."""
     ambient_dn_per_s: float | None = Field(default=None, ge=0)
     """Light on that scene that is not the camera's; null measures it."""
 

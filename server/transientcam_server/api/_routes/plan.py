@@ -8,8 +8,8 @@ from fastapi import APIRouter, Request, Response, status
 from transientcam_driver import Sequence
 from transientcam_server.api import _planned as planned
 from transientcam_server.api._auth import Role
-from transientcam_server.api._auth.permissions import needs
-from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._auth.permissions import TO_LIGHT, needs, require
+from transientcam_server.api._dependencies import OffsOf, ServiceOf
 from transientcam_server.api._documents.job import JobDocument
 from transientcam_server.api._documents.plan import PlanDocument, PlanRequest
 from transientcam_server.api._job_answers import ACCEPTED
@@ -29,37 +29,45 @@ from transientcam_server.service import Service
 router = APIRouter(tags=["accuracy"])
 KIND: Final = "plan"
 """Of the jobs that make a plan."""
+_OF_LOOK: Final = (kinds.ROLE_TOO_LOW, kinds.MAY_NOT_LIGHT, kinds.LEASE_HELD, kinds.LEASE_LOST)
+_REFUSALS: Final = (
+    *(*planned.REFUSALS, kinds.INVALID_SEQUENCE, *_OF_LOOK),
+    *(kinds.CAMERA_BUSY, kinds.RECORDING_RUNS, kinds.START_OUTDATED),
+)
 
 
 @router.post(
     "/plan",
     summary="A sequence for a target accuracy or a budget of time",
-    responses=documented(*planned.REFUSALS, kinds.INVALID_SEQUENCE),
+    responses=documented(*_REFUSALS),
 )
 @needs(Role.VIEWER, lease=False)
-async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> PlanDocument:
+async def make_plan(
+    service: ServiceOf, request: PlanRequest, http: Request, offs: OffsOf
+) -> PlanDocument:
     """Recommend a sequence and an estimator with predicted accuracy, and neighbours.
 
     With targets it is the quickest one that reaches all of them with margin within the budgets;
     with budgets alone the most accurate one within them. Where no scene is given it is looked at:
     before a simulated camera by another one in virtual time, at all frequencies; before any other
-    by the current frame, and the plan cannot consider what that does not resolve. A camera of fixed
-    frequencies is refused; `takes` of the problem says what more of them give. Nothing is changed:
-    `sequence` of the answer is the body for a `PUT /sequence`. A client that leaves ends the work;
-    `POST /plan/jobs` reports its progress.
+    by the current frame, and the plan cannot consider what that does not resolve, or with `look` by
+    the camera itself at all frequencies, under the lease: no frames for some seconds. A camera of
+    fixed frequencies is refused; `takes` of the problem says what more of them give. Nothing is
+    changed: `sequence` of the answer is the body for a `PUT /sequence`. A client that leaves ends
+    the work; `POST /plan/jobs` reports its progress.
     """
-    return await planned.for_request(http, await _work(service, request, http))
+    return await planned.for_request(http, await _work(service, request, http, offs))
 
 
 @router.post(
     "/plan/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Make a plan as a job, with progress",
-    responses=ACCEPTED | documented(*planned.REFUSALS, kinds.INVALID_SEQUENCE, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED | documented(*_REFUSALS, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_plan(
-    service: ServiceOf, request: PlanRequest, http: Request, response: Response
+    service: ServiceOf, request: PlanRequest, http: Request, response: Response, offs: OffsOf
 ) -> JobDocument:
     """Begin to make the plan that `POST /plan` answers with, which is the `result` of the job.
 
@@ -68,19 +76,72 @@ async def start_plan(
     `GET /jobs/{job}/map`.
     """
     files: dict[str, bytes] = {}
-    work = await _work(service, request, http, files)
+    work = await _work(service, request, http, offs, files)
     return planned.as_job(service, KIND, work, response, files)
 
 
 async def _work(
-    service: Service, request: PlanRequest, http: Request, files: dict[str, bytes] | None = None
+    service: Service,
+    request: PlanRequest,
+    http: Request,
+    offs: int,
+    files: dict[str, bytes] | None = None,
 ) -> planned.Work[PlanDocument]:
-    """Return what makes the plan; a goal that cannot be meant or planned is refused at once."""
-    await planned.require_plannable(service, planned.address_of(http))
+    """Return what makes the plan; a goal that cannot be meant or planned is refused at once.
+
+    Once there is a place for the address it plans, and puts the map into the files of a job.
+    """
+    address, looks = planned.address_of(http), service.looks
+    await planned.require_plannable(service, address)
+    by_camera = request.look and looks.needs_frame and service.relay is None
     if request.scene is None:
         planned.require_scene(service)
-    goal, address = _goal(service, request), planned.address_of(http)
-    return partial(_made, service, request, goal, address, files)
+        if by_camera:
+            require(http, service, TO_LIGHT)
+            service.require_no_recording("A look")
+            service.acquisition.require_free()
+    goal, planning = _goal(service, request), service.planning
+    into = files if request.map else None
+    searched = 1.0 if into is None else 0.8
+
+    async def seen(progress: Progress) -> SceneStatistics:
+        if (scene := request.scene) is not None:
+            returns = [(each.range_m, each.weight) for each in scene.returns]
+            light, ambient = scene.brightness_dn_per_s, scene.ambient_dn_per_s
+            return uniform_scene(light, returns, ambient_dn_per_s=ambient)
+        if by_camera:
+            occupy = partial(service.acquisition.occupy, "look", offs=offs)
+            recipe = service.pipeline.recipe_of(service.applied)
+            return await looks.of_camera(occupy, recipe, request.ambient_dn_per_s, progress)
+        if looks.needs_frame:
+            frame = await service.hub.newest(after=0, wait_s=planned.FRAME_WITHIN_S)
+            return await looks.of_frame(frame, request.ambient_dn_per_s)
+        base = goal.base
+        same = Sequence(base_frequency_hz=base.base_frequency_hz, sub_phases=base.sub_phases)
+        return await looks.of_twin(same, request.ambient_dn_per_s, progress)
+
+    async def made(progress: Progress) -> PlanDocument:
+        async with planning.place_of(address):
+            scene = await seen(progress.part(0.0, planned.LOOKED))
+            plan = await planning.run(
+                service.planner.plan_document,
+                goal,
+                scene,
+                progress=progress.part(planned.LOOKED, searched),
+            )
+            if into is not None:
+                error_m = await planning.run(
+                    service.planner.map_m,
+                    scene,
+                    plan["estimator"],
+                    Sequence.from_document(plan["sequence"]),
+                    progress=progress.part(searched, 1.0),
+                )
+                into.update(map_files(error_m, goal.range_error_m))
+            _add_transport(plan["price"], service.hub.latest)
+            return PlanDocument.model_validate(plan)
+
+    return made
 
 
 def _goal(service: Service, request: PlanRequest) -> Goal:
@@ -101,38 +162,6 @@ def _goal(service: Service, request: PlanRequest) -> Goal:
     return goal
 
 
-async def _made(
-    service: Service,
-    request: PlanRequest,
-    goal: Goal,
-    address: str,
-    files: dict[str, bytes] | None,
-    progress: Progress,
-) -> PlanDocument:
-    """Plan once there is a place for the address, and put the map into the files of a job."""
-    into = files if request.map else None
-    searched = 1.0 if into is None else 0.8
-    async with service.planning.place_of(address):
-        scene = await _scene(service, request, goal.base, progress.part(0.0, planned.LOOKED))
-        made = await service.planning.run(
-            service.planner.plan_document,
-            goal,
-            scene,
-            progress=progress.part(planned.LOOKED, searched),
-        )
-        if into is not None:
-            error_m = await service.planning.run(
-                service.planner.map_m,
-                scene,
-                made["estimator"],
-                Sequence.from_document(made["sequence"]),
-                progress=progress.part(searched, 1.0),
-            )
-            into |= map_files(error_m, goal.range_error_m)
-        _add_transport(made["price"], service.hub.latest)
-        return PlanDocument.model_validate(made)
-
-
 def _add_transport(price: dict[str, Any], frame: Frame | None) -> None:
     """State what transport takes, by the newest frame."""
     begun_s = None if frame is None else frame.meta()["captured_unix_s"]
@@ -140,20 +169,3 @@ def _add_transport(price: dict[str, Any], frame: Frame | None) -> None:
         taken_s = frame.raw.host_time_s - begun_s - frame.raw.capture_s
         price["transport_s"] = max(0.0, taken_s)
         price["sum_s"] += price["transport_s"]
-
-
-async def _scene(
-    service: Service, request: PlanRequest, base: Sequence, progress: Progress
-) -> SceneStatistics:
-    scene = request.scene
-    if scene is not None:
-        return uniform_scene(
-            scene.brightness_dn_per_s,
-            [(each.range_m, each.weight) for each in scene.returns],
-            ambient_dn_per_s=scene.ambient_dn_per_s,
-        )
-    if service.looks.needs_frame:
-        frame = await service.hub.newest(after=0, wait_s=planned.FRAME_WITHIN_S)
-        return await service.looks.of_frame(frame, request.ambient_dn_per_s)
-    same = Sequence(base_frequency_hz=base.base_frequency_hz, sub_phases=base.sub_phases)
-    return await service.looks.of_twin(same, request.ambient_dn_per_s, progress)

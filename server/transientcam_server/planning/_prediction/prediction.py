@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence
@@ -34,7 +35,7 @@ from transientcam_server.planning._prediction.measures import (
 )
 from transientcam_server.planning._prediction.resolving import Resolving
 from transientcam_server.planning._scene.estimation import MOST_HARMONICS
-from transientcam_server.planning._scene.scene import SceneStatistics, resampled
+from transientcam_server.planning._scene.scene import STRATUM, SceneStatistics, resampled
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
@@ -50,6 +51,8 @@ FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
 """Factor between steps of noise."""
+OUTLYING: Final = 4.0
+"""What noise of the look adds to one pixel, over what those alike have, at most."""
 SWING: Final = 0.25
 """Error of a range that changes evenly during a capture, over that change."""
 OUTVOTED: Final = 3
@@ -199,6 +202,8 @@ class Predictor:
         """Bias in m that no exposure and no takes reduce."""
         self._go_on()
         scene = self.scene
+        if scene.again:  # whose noise would be in it
+            return 0.0
         b = scene.relative_moments(harmonics, base_frequency_hz)[:, FEW]
         variance = np.broadcast_to((self._nominal[FEW] * STEP**-4) ** 2, b.shape).astype(np.float32)
         variance[0] = 0
@@ -425,11 +430,37 @@ class Predictor:
             self.settings,
             zeroth=zeroth,
         )
-        return pixel_errors(
+        errors = pixel_errors(
             range_m.reshape((draws, -1)),
             self.scene.direct_m[pixels],
             self.scene.uncertainty_m[pixels],
         )
+        if not self.scene.again:
+            return errors
+        return self._without_noise_of_look(
+            errors, (estimator, harmonics, base_frequency_hz), variance, pixels
+        )
+
+    def _without_noise_of_look(
+        self, errors: PixelErrors, how: tuple[str, int, float], variance: _Array, pixels: slice
+    ) -> PixelErrors:
+        """Return errors whose bias has no noise of the look in it, by what pixels alike share.
+
+        What noise adds to the square of a bias it adds once more to that of what was seen with more
+        noise: extrapolated to none (Cook and Stefanski 1994).
+        """
+        scene, squares, (estimator, harmonics, base_hz) = self.scene, [], how
+        for each in (scene, *(replace(scene, **drawn) for drawn in scene.again)):
+            b = each.relative_moments(harmonics, base_hz)[:, pixels]
+            range_m = ranges_m(b, variance, estimator, base_hz, self.settings)
+            off_m = np.hypot(range_m - each.direct_m[pixels], each.uncertainty_m[pixels])
+            squares.append(np.nan_to_num(off_m) ** 2)
+        here = np.maximum(uniform_filter1d(squares[0], STRATUM), 1e-18)
+        noise = np.minimum(np.mean(squares[1:], axis=0) - squares[0], OUTLYING * here)
+        left = np.sqrt(np.clip(1 - uniform_filter1d(noise, STRATUM) / here, 0.0, 1.0))
+        left = np.where(np.isfinite(errors.bias_m), left, 1.0)
+        centre_m = errors.centre_m - (1 - left) * errors.signed_m
+        return replace(errors, bias_m=left * errors.bias_m, centre_m=centre_m)
 
 
 def _out_of_step(b: _Array, share: float, takes: int, random: np.random.Generator) -> _Array:

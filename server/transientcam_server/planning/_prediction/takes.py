@@ -35,8 +35,8 @@ def predict_takes(
 ) -> list[TakesPrediction]:
     """Capture a frame of one take, and predict what more of them give.
 
-    Noise of the moments falls with the root of the takes; what calibration and light of no model
-    leave in them (`tm.likelihood`'s ``model_error``) does not.
+    The deviation is that between frames: what calibration and light of no model leave in their
+    moments (`tm.likelihood`'s ``model_error``) is weighed, as in frames, and does not scatter.
 
     ``camera``: Its sequence is set to one take; it does not stream afterwards.
     ``takes``: Those that the camera cannot do are left out.
@@ -67,11 +67,12 @@ def takes_of(
     found = replace(recipe, settings=settings).reconstruct(frame)
     assert found.noise is not None  # noqa: S101 - the sensor is known
     sequence, sampling = recipe.applied.sequence, recipe.applied.sequence.sampling
-    moments, multiples = np.asarray(found.smoothed), None
+    moments = np.asarray(found.smoothed)
+    harmonics = tuple(range(len(moments)))
     if not sampling.consecutive:
         known = () if sequence.zeroth == "estimated" else (0,)
-        multiples = (*known, *sampling.multiples)
-        moments = moments[-len(multiples) :]
+        harmonics = (*known, *sampling.multiples)
+        moments = moments[-len(harmonics) :]
     flat = moments.reshape((len(moments), -1))
     step = max(1, flat.shape[1] // _PIXELS)
     b = flat[:, step // 2 :: step]
@@ -83,8 +84,9 @@ def takes_of(
         if count <= min(capabilities.max_takes, capabilities.max_images // images):
             more = capabilities.apply(replace(sequence, takes=count))
             noise = tm.noise.MomentNoise(of_one / count)
-            fitted = tm.two_returns(b, noise, harmonics=multiples, model_error=MODEL_ERROR)
+            fitted = tm.two_returns(b, noise, harmonics=harmonics, model_error=MODEL_ERROR)
             std_rad = fitted.direct_phase_std_rad(settings.return_threshold)
+            std_rad = std_rad * tm.noise.scatter(b, noise, harmonics, MODEL_ERROR)
             median_m = float(np.nanmedian(tm.range_m(std_rad, sequence.base_frequency_hz)))
             predicted.append(TakesPrediction(count, more.capture_s, more.frame_rate_hz, median_m))
     return predicted

@@ -36,6 +36,8 @@ LEAST_STILL: Final = 0.1
 """Share of the lit pixels that has to stand still for the others to be left out."""
 _EARLY: Final = 0.9
 """Share of a period by which a direct return may come before the mean of all light."""
+NOISIER: Final = 3
+"""Draws that show what the noise of a single frame adds to what seems to be bias."""
 DIM: Final = 0.2
 """What a surface gets from a lit one beside it, over what that one gets, is hardly more."""
 BRIGHT_SHARE: Final = 0.95
@@ -58,6 +60,7 @@ class FrameAverages:
     ``mean_dn``: (H, W) mean of all four-bucket images above the dark level.
     ``highest_dn``: (H, W) the most that an image holds above the dark level.
     ``usable``: (H, W) which pixels are not saturated.
+    ``ideal``: Whether the device is known to be what nominal gains take it for.
     """
 
     recipe: Recipe
@@ -72,6 +75,7 @@ class FrameAverages:
     mean_dn: _Array
     highest_dn: _Array
     usable: _Array
+    ideal: bool = False
 
     def brightest_dn(self, within: _Array | None = None) -> float:
         """Return what the brightest pixels, of those within (H, W), hold above the dark level."""
@@ -123,6 +127,11 @@ class FrameAverages:
         """Return the gains in use over the nominal ones, (m + 1, H, W) or of one pixel."""
         nominal, gains = self.recipe.nominal_gains[:, None, None], self.recipe.gains
         return np.ones_like(nominal) if gains is None else gains.planes / nominal
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the moments are known to be the scene's: nominal gains may be off."""
+        return self.ideal or self.recipe.gains is not None
 
 
 def describe(
@@ -204,15 +213,37 @@ def _described(
     variance = averages.variance(mean_dn) * (1 / averages.frames + gain_noise)
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     contrast = averages.contrast
-    if averages.recipe.gains is None and coarse is None:
+    if not averages.calibrated:
         contrast = contrast_of_picture(b, variance)
         b, variance = b / contrast[:, None], variance / contrast[:, None] ** 2
         picture = picture / contrast[:, None, None]
-    elif coarse is not None and not still:
+    if coarse is not None and not still:
         b = _of_one_return(b, coarse, pixels, base_hz)
     told = 1 + int(np.flatnonzero(contrast >= LEAST_CONTRAST)[-1])
     b, variance = b[:told], variance[:told]
-    direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
+
+    def told_by(b: _Array) -> dict[str, Any]:
+        direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
+        relative = (b / light_dn).astype(np.complex64)
+        relative[0] = 1.0
+        returns = tm.pisarenko(relative)
+        weight = np.asarray(returns.weight, dtype=float)
+        phase = np.asarray(returns.phase_rad, dtype=float)
+        return {
+            "direct_m": direct_m,
+            "uncertainty_m": uncertainty_m,
+            "delay_s": np.where(weight > 0, phase / (2 * np.pi * base_hz), np.nan),
+            "share": weight / np.maximum(1.0, weight.sum(axis=0)),
+            "measured": relative,
+        }
+
+    shape = told_by(b)
+    direct_m, uncertainty_m = shape["direct_m"], shape["uncertainty_m"]
+    again: tuple[dict[str, Any], ...] = ()
+    if coarse is None and not every:
+        noise, random = tm.noise.MomentNoise(variance), np.random.default_rng(0)
+        drawn = tm.noise.draw(b, noise, random, draws=NOISIER)
+        again = tuple(told_by(drawn[:, draw]) for draw in range(NOISIER))
     earliest_m, latest_m = direct_m, direct_m
     if not every:  # of maps nobody asks for it
         earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
@@ -225,23 +256,15 @@ def _described(
         ambient = np.maximum(mean_dn - light_dn / 2, 0.0) / averages.exposure_s
     else:
         ambient = np.full(pixels.size, ambient_dn_per_s)
-    relative = (b / light_dn).astype(np.complex64)
-    relative[0] = 1.0
-    returns = tm.pisarenko(relative)
-    weight = np.asarray(returns.weight, dtype=float)
-    phase = np.asarray(returns.phase_rad, dtype=float)
     return SceneStatistics(
+        **shape | {"direct_m": direct_m},
         brightness_dn_per_s=light_dn / averages.exposure_s,
         ambient_dn_per_s=ambient,
         brightest_dn_per_s=averages.brightest_dn(within) / averages.exposure_s,
-        direct_m=direct_m,
-        uncertainty_m=uncertainty_m,
         earliest_m=earliest_m,
         latest_m=latest_m,
-        delay_s=np.where(weight > 0, phase / (2 * np.pi * base_hz), np.nan),
-        share=weight / np.maximum(1.0, weight.sum(axis=0)),
+        again=again,
         base_frequency_hz=base_hz,
-        measured=relative,
         relative_noise=np.sqrt(variance[1]) / light_dn,
         lit_share=float((lit if within is None else lit[within]).mean()),
         dim_share=dim_share(light_dn, direct_m),
@@ -249,7 +272,7 @@ def _described(
         ambiguity_checked=checked,
         contrast=tuple(contrast.tolist()),
         uncalibrated_m=averages.uncalibrated_m,
-        calibrated=coarse is not None or averages.recipe.gains is not None,
+        calibrated=averages.calibrated,
         swing_m_per_s=(
             None if swings_m_per_s is None else _typical_swings(swings_m_per_s[:, lit], pixels.size)
         ),

@@ -46,6 +46,8 @@ FILLED: Final = 0.6
 """How full the brightest pixels of the look are."""
 MOST_HARMONICS: Final = 16
 _SPARE_S: Final = 10.0
+_COMPUTED_S: Final = 600.0
+"""A simulated device takes as long as it is computed."""
 _DARKER: Final = 8.0
 
 
@@ -121,7 +123,7 @@ class _FrameSums:
         )
 
 
-def look_at(
+def capture_look(
     camera: Camera,
     sensor: tm.noise.Sensor,
     settings: ReconstructionSettings,
@@ -129,15 +131,18 @@ def look_at(
     base: Sequence | None = None,
     ambient_dn_per_s: float | None = None,
     calibrated_c: float | None = None,
+    in_use: Gains | None = None,
     go_on: Callable[[str], None] = lambda stage: None,
-) -> SceneStatistics:
-    """Look at the scene before a camera.
+) -> Callable[[], SceneStatistics]:
+    """Capture what shows the scene before a camera, and return what describes it.
 
     Coarse frames at a low frequency give brightness, ambient light, head room and the range to
     75 m; fine ones in between at half the base frequency, with harmonics up to the camera's highest
     frequency, hold the moments of every sequence whose frequencies are multiples of that. As a
     calibration fits one sequence alone, a simulated camera is calibrated for the look, by the
-    diffuser that it has: plans are for a camera that is calibrated with what they recommend.
+    diffuser that it has: plans are for a camera that is calibrated with what they recommend. Any
+    other one captures its fine frames with the sequence that its calibration in use fits; without
+    one nominal gains are all there is, which are no calibration.
 
     ``camera``: Is left with another sequence, stopped.
     ``sensor``: Of the camera.
@@ -147,10 +152,11 @@ def look_at(
     ``ambient_dn_per_s``: Light that is not the camera's; None takes it from the mean of the images.
     ``calibrated_c``: Temperature of the camera at the calibration in use; None where that is not
     known.
+    ``in_use``: Gains that fit ``base``, of a camera that is not simulated; None without any.
     ``go_on``: Called with the name of the stage before each frame; whatever it raises ends the
     look.
-    Raises Problem: ``target-unreachable`` where no pixel has light, or the shortest exposure
-    saturates.
+    Raises Problem: ``target-unreachable`` where the shortest exposure saturates, and what is
+    returned where no pixel has light.
     Raises CameraError: As the camera does.
     """
     base = base or Sequence()
@@ -168,7 +174,8 @@ def look_at(
         applied = camera.configure(capabilities.nearest(sequence))
         recipe = Recipe(applied, settings, float(sensor.highest_dn), gains, sensor=sensor)
         sums = more_of or _FrameSums(recipe, sensor)
-        spare_s = _SPARE_S + 4 / applied.frame_rate_hz
+        spare_s = _SPARE_S if camera.simulation is None else _COMPUTED_S
+        spare_s += 4 / applied.frame_rate_hz
 
         def take(count: int) -> None:
             for _ in range(count):
@@ -238,14 +245,16 @@ def look_at(
     fine_sequence = replace(
         base, base_frequency_hz=fine_hz, harmonics=harmonics, zeroth="estimated", takes=TAKES
     )
-    gains, lost_share = calibrated(fine_sequence)
-    exposure_s = filling_s(coarse_sequence)
+    gains, lost_share = (in_use, 0.0) if in_use else calibrated(fine_sequence)
+    exposure_s = base.exposure_s if in_use else filling_s(coarse_sequence)
     # one frequency alone does not tell which image lost its synchronisation
     takes, several = (2 * TAKES, 2) if lost_share else (TAKES, 1)
     coarse_sequence = replace(coarse_sequence, exposure_s=exposure_s, takes=takes)
     fine_sequence = replace(fine_sequence, exposure_s=exposure_s)
+    if in_use:
+        fine_sequence = replace(base, takes=TAKES)
     quick_sequence = replace(
-        fine_sequence, base_frequency_hz=2 * fine_hz, harmonics=several, takes=1
+        coarse_sequence, base_frequency_hz=2 * fine_hz, harmonics=several, takes=1
     )
     quick = [captured(quick_sequence, 2, "motion").averages()]
     coarse = captured(coarse_sequence, 1, "coarse range")
@@ -258,24 +267,30 @@ def look_at(
         more_if_still=STILL_FRAMES - FRAMES,
         more_of=sums,
     )
-    fine = sums.averages()
+    fine = replace(sums.averages(), ideal=gains is None and camera.simulation is not None)
     captured(coarse_sequence, 1, "coarse range", more_of=coarse)
     moves = not _still(fine)
     if moves:
         quick.append(captured(quick_sequence, 2, "motion").averages())
-    go_on("direct range")
-    scene = describe(
-        fine,
-        settings,
-        coarse=coarse.averages(),
-        ambient_dn_per_s=ambient_dn_per_s,
-        gain_noise=0.0 if gains is None else TAKES / CALIBRATION_TAKES,
-        quick=quick if moves else (),
-    )
-    if scene is None:
-        raise no_light()
-    drift_m = _drift_m(calibrated_c, fine.temperature_c)
-    return replace(scene, drift_m=drift_m, lost_share=lost_share)
+    gain_noise = 0.0 if gains is None else TAKES / CALIBRATION_TAKES
+    of_motion = quick if moves else ()
+
+    def described() -> SceneStatistics:
+        go_on("direct range")
+        scene = describe(
+            fine,
+            settings,
+            coarse=coarse.averages(),
+            ambient_dn_per_s=ambient_dn_per_s,
+            gain_noise=gain_noise,
+            quick=of_motion,
+        )
+        if scene is None:
+            raise no_light()
+        drift_m = _drift_m(calibrated_c, fine.temperature_c)
+        return replace(scene, drift_m=drift_m, lost_share=lost_share)
+
+    return described
 
 
 def no_light() -> Problem:

@@ -7,6 +7,7 @@ kind, to less than 1 %. What these few leave undecided is decided by eight times
 """
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final
@@ -179,6 +180,8 @@ class SceneStatistics:
     pixel's light (0 where unused). What the shares leave to 1 comes back evenly at all times.
     ``measured``: (M + 1, P) measured moments over the brightness, at multiples of
     `base_frequency_hz`; None where the returns are given exactly.
+    ``again``: The shape of the light anew, by `direct_m` to `measured`, once the noise of the look
+    is added to what it saw, in several draws; empty of a look that has hardly any.
     ``relative_noise``: (P) deviation of these moments over the brightness.
     ``lit_share``: Share of all pixels whose light stands clear of the noise.
     ``dim_share``: Share of the lit pixels that other surfaces may light alone.
@@ -213,6 +216,7 @@ class SceneStatistics:
     share: _Array
     base_frequency_hz: float = 0.0
     measured: _Array | None = None
+    again: tuple[dict[str, Any], ...] = ()
     relative_noise: _Array | None = None
     lit_share: float = 1.0
     dim_share: float = 0.0
@@ -242,7 +246,8 @@ class SceneStatistics:
             for name, value in values.items()
             if isinstance(value, np.ndarray) and name != "picture"
         }
-        return replace(self, **of_pixels)
+        again = tuple({name: x[..., chosen] for name, x in each.items()} for each in self.again)
+        return replace(self, **of_pixels, again=again)
 
     def within(self, region: Region | None, *, every: bool = False) -> "SceneStatistics":
         """Return what is seen in a region, by typical pixels or by ``every`` lit one.
@@ -293,7 +298,9 @@ class SceneStatistics:
     @property
     def disagreement_m(self) -> float:
         """What the look did not resolve of the direct range, in the median pixel."""
-        return float(np.median(self.uncertainty_m))
+        found = float(np.median(self.uncertainty_m))
+        noisier = [float(np.median(each["uncertainty_m"])) for each in self.again] or [found]
+        return math.sqrt(max(0.0, 2 * found**2 - float(np.square(noisier).mean())))
 
     @property
     def conditions(self) -> str:

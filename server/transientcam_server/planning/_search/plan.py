@@ -79,10 +79,13 @@ _CLEARLY_LESS: Final = 0.8
 """Share of the best error that what is dearer has to stay below to be named."""
 
 
-def refusal(goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False) -> Problem:
+def refusal(
+    goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False, calibrated: bool = True
+) -> Problem:
     """Return the problem ``target-unreachable`` of what falls short of a goal.
 
-    A frame of another purpose, in the place of a look, decides nothing: a capture may do better.
+    A frame of another purpose, or a look without a calibration, decides nothing: a capture may do
+    better.
     """
     field, best = shortfall.field, shortfall.best
     limit, achieved = getattr(goal, field), _achieved(best, field)
@@ -93,13 +96,16 @@ def refusal(goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False) -> 
         of_share = f" in {goal.share:.0%} of the pixels"
     if field.startswith("range") and achieved <= limit:
         margin = ", which leaves no margin"
-    decided = not (of_one_frame and field.startswith("range"))
+    decided = (calibrated and not of_one_frame) or not field.startswith("range")
+    witness, better = "a look without a calibration", "a calibrated camera"
+    if of_one_frame:
+        witness, better = "one frame", "a look at all frequencies"
     verdict = (
         f"This cannot be reached on this scene: {field} = {limit:g}{of_share}. "
         f"The best {named} is {achieved:.4g}{margin}."
         if decided
-        else f"Whether this can be reached one frame does not tell: {field} = {limit:g}{of_share}. "
-        f"By it the best {named} is {achieved:.4g}; a look at all frequencies may find less."
+        else f"Whether this can be reached {witness} does not tell: {field} = {limit:g}{of_share}. "
+        f"By it the best {named} is {achieved:.4g}; {better} may find less."
     )
     return Problem(
         kinds.TARGET_UNREACHABLE,
@@ -304,7 +310,7 @@ def _time_in_words(time_s: float) -> str:
     return f"{time_s:.3g} s" if time_s >= 1 else f"{time_s * 1e3:.3g} ms"
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True)
 class Plan:
     """A recommendation and its neighbours; None where there is none.
 
@@ -345,10 +351,6 @@ class Plan:
             "twice_accuracy": self._neighbour(self.twice_accuracy),
         }
 
-    def __repr__(self) -> str:
-        """State the recommended sequence, and what it takes and gives."""
-        return f"<Plan {_in_words(self.recommended)}>"
-
     def _neighbour(self, choice: Choice | None) -> dict[str, Any] | None:
         if choice is None:
             return None
@@ -387,7 +389,8 @@ def plan(
     best = best_choice(candidates, targets, leading)
     if best is None or best.relative_errors(targets)[1] > 1:
         missed = shortfall(goal, best, candidates, unlimited)
-        raise refusal(goal, missed, of_one_frame=predictor.scene.of_one_frame)
+        seen = {name: getattr(predictor.scene, name) for name in ("of_one_frame", "calibrated")}
+        raise refusal(goal, missed, **seen)
     progress.at(0.7, "half the time")
     best, half_time = shortened(best, candidates, targets, leading)
     progress.at(0.8, "twice the accuracy")
@@ -398,13 +401,3 @@ def plan(
     words, sequence = summary(best, twice, scene) + scene.conditions, best.applied.sequence
     times_s = {name: timed(sequence, name) for name in dict.fromkeys((best.estimator, *SEARCHED))}
     return Plan(best, half_time, twice, leading, words, scene, goal, better, times_s)
-
-
-def _in_words(choice: Choice) -> str:
-    predicted = choice.predicted
-    return (
-        f"{choice.in_words()}: captures in {choice.applied.capture_s * 1e3:.1f} ms, "
-        f"range to {choice.range_error.median * 1e3:.2f} mm "
-        f"({predicted.range_std.median * 1e3:.2f} noise, "
-        f"{predicted.range_bias_m * 1e3:.2f} bias)"
-    )

@@ -74,6 +74,27 @@ def test_a_plan_for_the_scene_before_the_camera_is_a_sequence_it_takes(noisy: ht
     assert answer["twice_accuracy"]["time_factor"] > 1
 
 
+def test_a_camera_without_a_twin_looks_by_itself_and_frames_go_on(
+    noisy_daemon: Served, noisy: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a camera that is not simulated: of one frame no target is out of reach."""
+    monkeypatch.setattr(noisy_daemon.service.looks, "_twin", None)
+    before = noisy.get("/api/v1/sequence").json()
+
+    of_frame, of_look = (ask(noisy, target={"range_error_m": 1e-5}, look=x) for x in (False, True))
+
+    assert [each.json()["decided"] for each in (of_frame, of_look)] == [False, True]
+    latest = noisy.get("/api/v1/frames/latest", params={"wait_s": 10.0}).json()
+    after = latest["frame"]
+    newer = noisy.get("/api/v1/frames/latest", params={"after": after, "wait_s": 10.0}).json()
+    assert newer["frame"] > after
+    restored = noisy.get("/api/v1/sequence").json()
+    assert restored == before | {"sequence_id": restored["sequence_id"]}
+    with Camera(noisy_daemon.url) as other, other.lease("another client"):
+        refused = ask(noisy, target={"range_error_m": 0.02}, look=True)
+    assert (refused.status_code, refused.json()["type"]) == (409, "/problems/lease-held")
+
+
 def test_a_given_scene_needs_no_frame(noisy: httpx.Client) -> None:
     answer = ask(noisy, budget={"capture_s": 0.2}, scene=SCENE).json()
 

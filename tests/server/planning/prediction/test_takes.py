@@ -43,12 +43,12 @@ class FixedDevice:
         pass
 
 
-@pytest.mark.parametrize(("read_noise_e", "of_four"), [(10.0, 0.5), (0.01, 1.0)])
-def test_noise_falls_with_the_root_of_the_takes_and_the_error_of_the_model_does_not(
-    read_noise_e: float, of_four: float
+@pytest.mark.parametrize(("read_noise_e", "gain_e_per_dn"), [(10.0, 1.0), (0.01, 1e4)])
+def test_scatter_falls_with_the_root_of_the_takes_however_large_the_error_of_the_model(
+    read_noise_e: float, gain_e_per_dn: float
 ) -> None:
     sensor = tm.noise.Sensor(
-        gain_e_per_dn=1e4 if of_four == 1.0 else 1.0,
+        gain_e_per_dn=gain_e_per_dn,
         full_well_e=1e9,
         read_noise_e=read_noise_e,
         dark_dn=0.0,
@@ -64,10 +64,10 @@ def test_noise_falls_with_the_root_of_the_takes_and_the_error_of_the_model_does_
         settings = ReconstructionSettings(neighbours="none", estimator="two-returns")
         gains = factory_gains(camera.factory)
         recipe = Recipe(camera.applied, settings, 4095.0, gains, sensor=sensor)
-        shown_m = recipe.reconstruct(camera.read_frame(timeout_s=60.0)).range_std_m
+        shown_m = recipe.reconstruct(camera.read_frame(timeout_s=60.0)).range_scatter_m()
     assert [each.takes for each in found] == [1, 2, 4]  # the camera can do six
     one, _, four = found
     assert four.capture_s == pytest.approx(4 * one.capture_s)
     assert four.frame_rate_hz == pytest.approx(one.frame_rate_hz / 4)
-    assert four.range_std_m / one.range_std_m == pytest.approx(of_four, rel=0.1)
+    assert four.range_std_m / one.range_std_m == pytest.approx(0.5, rel=0.1)
     assert one.range_std_m == pytest.approx(np.nanmedian(shown_m), rel=0.1)

@@ -152,6 +152,22 @@ def test_what_a_device_does_is_not_taken_for_the_scene() -> None:
     assert "drifted" in scene.conditions
 
 
+def test_nominal_gains_of_a_real_camera_are_no_calibration() -> None:
+    """What it modulates less is taken from the picture, and nothing is out of reach for certain."""
+    with open_camera("sim:wall?device=prototype&seed=7", clock=VirtualClock()) as camera:
+        planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        scene = planner.look(cast(Camera, Carried(camera, 0)), Sequence())
+
+    assert not scene.calibrated
+    assert np.array(scene.contrast)[[1, 4, 8]] == pytest.approx([1.0, 0.951, 0.553], abs=0.06)
+    assert scene.disagreement_m < 1e-3
+    assert "calibrate first" in scene.conditions
+    goal = Goal(range_error_m=1e-5, estimator="single-frequency")
+    with pytest.raises(Problem, match="a look without a calibration does not tell") as refused:
+        planner.plan(goal, scene)
+    assert refused.value.extensions["decided"] is False
+
+
 BALL = """
 [[motion]]
 name = "roll"

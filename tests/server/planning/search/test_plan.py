@@ -57,10 +57,6 @@ def test_a_bias_that_is_not_known_is_marked_with_the_reason(
 def test_a_plan_shows_what_it_recommends(capabilities: Capabilities) -> None:
     found = planned(Goal(range_error_m=0.02), capabilities)
 
-    sequence = found.recommended.applied.sequence
-    assert repr(found).startswith(f"<Plan m = {sequence.harmonics} at ")
-    assert found.recommended.estimator in repr(found)
-    assert "bias)" in repr(found)
     assert "mm noise, " in found.summary
 
 

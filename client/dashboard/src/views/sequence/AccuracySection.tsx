@@ -140,7 +140,9 @@ function Finding({ task }: { task: Task }) {
 
 /** A target, a budget, or both: for a share of the pixels, of the region that is marked or of all. */
 function GoalForm({ disabled, onGoal }: { disabled: boolean; onGoal: (goal: PlanRequest) => void }) {
-  const { measures } = useStore();
+  const { measures, camera } = useStore();
+  const real = camera.value?.simulated === false;
+  const look = useSignal(true);
   const error_mm = useSignal("");
   const share_percent = useSignal("90");
   const inRegion = useSignal(true);
@@ -158,6 +160,7 @@ function GoalForm({ disabled, onGoal }: { disabled: boolean; onGoal: (goal: Plan
           budget: rate === null ? {} : { frame_rate_hz: rate },
           share,
           region: inRegion.value ? askedRegion(measures.region.value) : null,
+          ...(real && { look: look.value }),
         })
       }
     >
@@ -171,6 +174,15 @@ function GoalForm({ disabled, onGoal }: { disabled: boolean; onGoal: (goal: Plan
       >
         {measures.region.value === null ? "no region is marked" : "in the region"}
       </Check>
+      {real && (
+        <Check
+          checked={look.value}
+          title="At all frequencies; else by the current frame alone"
+          onChange={(checked) => (look.value = checked)}
+        >
+          look first, some seconds without frames
+        </Check>
+      )}
       <Button type="submit" disabled={disabled || !sensible}>
         Plan
       </Button>
