@@ -11,7 +11,6 @@ from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
 from transientcam_server.api._docs import asyncapi
-from transientcam_server.api._middleware.security import SECURITY_HEADERS
 from transientcam_server.errors import Problem, kinds
 
 STATIC: Final = Path(__file__).parents[2] / "static"
@@ -71,9 +70,7 @@ async def cameras() -> FileResponse:
 
     Side by side it holds the pages of the others in frames.
     """
-    policy = f"frame-src http: https:; {SECURITY_HEADERS['Content-Security-Policy']}"
-    headers = {"Content-Security-Policy": policy}
-    return FileResponse(_OWN / "cameras.html", media_type="text/html", headers=headers)
+    return FileResponse(_OWN / "cameras.html", media_type="text/html")
 
 
 @router.get("/cameras/{file}")

@@ -20,6 +20,9 @@ MAX_BODY_BYTES: Final = 1024 * 1024
 _SAFE_METHODS = frozenset(("GET", "HEAD", "OPTIONS"))
 _LOOPBACK_NAMES = frozenset(("localhost", "127.0.0.1", "[::1]"))
 _DEFAULT_PORTS = {"http": 80, "https": 443}
+_WITH_FRAMES: Final = "/cameras"
+"""The page that shows the pages of other cameras."""
+
 SECURITY_HEADERS: Final = {
     # the page's own files and nothing else; blob: for the workers and pictures it makes itself
     "Content-Security-Policy": (
@@ -51,6 +54,8 @@ class SecurityHeaders:
                 headers = MutableHeaders(scope=message)
                 for name, value in self._headers.items():
                     headers.setdefault(name, value)
+                if scope["path"] == _WITH_FRAMES:
+                    headers["Content-Security-Policy"] += "; frame-src http: https:"
             await send(message)
 
         await self._app(scope, receive, with_headers)
