@@ -72,7 +72,10 @@ def cameras_here(*, network: bool) -> dict[str, Any]:
             extra = extra_of(error.name or "", _VERB) or extra_of(point.module, _VERB)
             missing = CommandUnavailable(_VERB, error.name or "", extra)
             document["problems"][point.name] = str(missing)
-        except Exception as error:  # one plug-in, of any package, must not hide the others
+        except (
+            Exception,
+            SystemExit,
+        ) as error:  # one plug-in, of any package, must not hide the others
             # an error that was raised on purpose is a sentence; any other needs its name
             ours = type(error).__module__.startswith("transientcam")
             text = str(error) if ours else f"{type(error).__name__}: {error}"

@@ -1,15 +1,13 @@
 """Open a camera by its name, ``NAME:ADDRESS?option=value``, through the plug-in of that name."""
 
-from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
-from typing import Final, TypeVar
+from typing import Final
 
 from transientcam_driver.camera._camera import Camera
 from transientcam_driver.camera._plugin import GROUP, CameraName, CameraPlugin
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import DriverError, PluginError, SpecError
 
-_T = TypeVar("_T")
 DEFAULT_SPEC: Final = "sim:mirrors"
 
 
@@ -37,7 +35,12 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
         The camera is absent, busy, or may not be opened.
     """
     name, plugin = plugin_of(spec)
-    camera = _of_package(name.kind, "open", plugin.open, name, clock or RealClock())
+    try:
+        camera = plugin.open(name, clock or RealClock())
+    except DriverError:
+        raise
+    except (Exception, SystemExit) as error:  # of a package that is not ours
+        raise PluginError(name.kind, f"open() raised {error!r:.200}") from error
     if not hasattr(camera, "read_frame"):
         raise PluginError(name.kind, f"open() returned {camera!r:.60}, no Camera")
     return camera
@@ -49,7 +52,7 @@ def check_camera(spec: str) -> None:
     Raises DriverError as `open_camera`, as far as it can be known.
     """
     name, plugin = plugin_of(spec)
-    _of_package(name.kind, "check", plugin.check, name)
+    plugin.check(name)
 
 
 def kinds() -> tuple[str, ...]:
@@ -89,13 +92,3 @@ def _load(point: EntryPoint) -> CameraPlugin:
         reason = f"{point.value} is a {type(plugin).__name__}, not a CameraPlugin"
         raise PluginError(point.name, reason)
     return plugin
-
-
-def _of_package(kind: str, call: str, function: Callable[..., _T], *given: object) -> _T:
-    """Return what a plug-in's function returns; PluginError where it raises what is no sentence."""
-    try:
-        return function(*given)
-    except DriverError:
-        raise
-    except (Exception, SystemExit) as error:
-        raise PluginError(kind, f"{call}() raised {error!r:.200}") from error

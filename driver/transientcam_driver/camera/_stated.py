@@ -42,7 +42,7 @@ def require_stated(stated: object, path: str = "") -> None:
     """
     for name, kind in get_type_hints(type(stated)).items():
         value = getattr(stated, name)
-        require(path + name, _fits(value, kind), _words(kind), value)
+        require(path + name, _fits(value, kind), _WORDS.get(kind) or str(kind), value)
         several = isinstance(value, list | tuple)
         for at, each in enumerate(value if several else (value,)):
             if is_dataclass(each):
@@ -62,12 +62,3 @@ def _fits(value: Any, kind: Any) -> bool:
     if kind is float:
         return finite(value) is not None
     return isinstance(value, {int: Integral, complex: Complex}.get(of, of))
-
-
-def _words(kind: Any) -> str:
-    given = get_args(kind)
-    if get_origin(kind) is Literal:
-        return " or ".join(given)
-    if get_origin(kind) in (Union, UnionType):
-        return " or ".join(map(_words, given))
-    return _WORDS.get(kind) or str(getattr(kind, "__name__", kind))

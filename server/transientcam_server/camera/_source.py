@@ -112,21 +112,14 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
     wanted = Sequence(**settings.model_dump())
     nearest = camera.capabilities.nearest(wanted)
     if nearest != wanted:
-        asked, does = wanted.to_document(), nearest.to_document()
-        other = [
-            f"{name} {_in_words(does[name])} in place of {_in_words(asked[name])}"
-            for name in asked
-            if asked[name] != does[name]
-        ]
+        asked = wanted.to_document()
+        does = nearest.to_document()
+        words = ", ".join(f"{name} {does[name]}" for name in asked if does[name] != asked[name])
         level = logging.WARNING if settings.model_fields_set else logging.INFO
-        _log.log(level, "the camera starts with what it can do: %s", ", ".join(other))
+        _log.log(
+            level, "the camera cannot do all of the sequence that was set; it starts with %s", words
+        )
     camera.configure(nearest)
-
-
-def _in_words(value: object) -> str:
-    if isinstance(value, dict):  # sub-phases: "arccos x 8"
-        return " x ".join(map(str, value.values()))
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,8 +49,8 @@ class AcquisitionStatus:
     def obstacle(self) -> str:
         """Why no frames come, and what helps; empty where they come or may soon."""
         if self.state == "stopped":
-            remedy = 'PUT /api/v1/acquisition {"running": true} starts the capture'
-            return f"{self.reason or 'nothing is captured'}. {remedy}"
+            why = self.reason or "nothing is captured"
+            return f'{why} (PUT /api/v1/acquisition {{"running": true}} starts it)'
         if self.state == "calibrating":
-            return "a calibration has the camera; frames come after it"
+            return "a calibration is measured"
         return "; ".join(self.obstacles)

@@ -131,3 +131,19 @@ test("a service that was started anew knows no answer, and it is said", async ()
   expect(accuracy.job.value).toBeNull();
   expect(accuracy.problem.value?.title).toContain("started anew");
 });
+
+test("it is predicted with the estimator that was chosen, or the best of the service's own", async () => {
+  const asked: unknown[] = [];
+  const api = answering({
+    "POST /tradeoff/jobs": ({ body }) => {
+      asked.push(body?.estimator);
+      return Promise.resolve(job("done"));
+    },
+    "GET /jobs/{job}": () => Promise.resolve(job("done")),
+  });
+  const chosen = new Accuracy(api);
+  await Promise.all([chosen.predict(), vi.advanceTimersByTimeAsync(2000)]);
+  chosen.estimator.value = "matched-filter";
+  await Promise.all([chosen.predict(), vi.advanceTimersByTimeAsync(2000)]);
+  expect(asked).toEqual([null, "matched-filter"]);
+});

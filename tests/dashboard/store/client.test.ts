@@ -32,7 +32,9 @@ class Page {
     shelf: null,
     api: new Api(() =>
       Promise.resolve(
-        new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent, products: this.products, active: null, recordings: [] })),
+        new Response(
+          JSON.stringify({ ...CAMERA, absent_products: this.absent, estimators: [], products: this.products, active: null, recordings: [] }),
+        ),
       ),
     ),
   });

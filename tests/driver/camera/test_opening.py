@@ -230,7 +230,7 @@ def test_a_plug_in_that_cannot_be_used_says_why(
 @pytest.mark.parametrize(
     ("opens", "reason"),
     [
-        (lambda name, clock: {}["lut"], r"open\(\) raised KeyError\('lut'\)"),
+        (lambda name, clock: name.options["lut"], r"open\(\) raised KeyError\('lut'\)"),
         (lambda name, clock: sys.exit(5), r"open\(\) raised SystemExit\(5\)"),
         (lambda name, clock: None, r"open\(\) returned None, no Camera"),
     ],

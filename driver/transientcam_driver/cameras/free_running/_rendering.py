@@ -91,12 +91,8 @@ class Renderer:
             known_s = finite(value_s)
             known = known_s is not None and abs(known_s) < _LATEST_S
             require(name, known, f"a number below {_LATEST_S:g} s", value_s)
-        moments = [
-            np.isnan(each)
-            for each, kind in zip(images, kinds, strict=True)
-            if isinstance(kind, Moment)
-        ]
-        dark = np.all(moments, axis=0)  # of a pixel without any, there is no light
+        # a pixel without any moment has no light
+        dark = np.all([np.isnan(each) for each in images if each.dtype.kind in "fc"], axis=0)
         with np.errstate(over="ignore", invalid="ignore"):  # of spoilt pixels
             made = [
                 self._of_frequency(group, scale, [images[at] for at in group.places], dark)
