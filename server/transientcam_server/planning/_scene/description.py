@@ -237,7 +237,7 @@ def _described(
             "measured": relative,
         }
 
-    shape = told_by(b)
+    shape: dict[str, Any] = told_by(b)
     direct_m, uncertainty_m = shape["direct_m"], shape["uncertainty_m"]
     again: tuple[dict[str, Any], ...] = ()
     if coarse is None and not every:
@@ -250,6 +250,7 @@ def _described(
     checked = coarse is not None
     if coarse is not None:
         wrapped_m, direct_m = direct_m, _unwrapped(direct_m, b, coarse, pixels, base_hz)
+        shape["direct_m"] = direct_m
         earliest_m, latest_m = (each + direct_m - wrapped_m for each in (earliest_m, latest_m))
     if ambient_dn_per_s is None:
         # an image holds, on average over four phases, dark + ambient + b_0 / 2
@@ -257,7 +258,7 @@ def _described(
     else:
         ambient = np.full(pixels.size, ambient_dn_per_s)
     return SceneStatistics(
-        **shape | {"direct_m": direct_m},
+        **shape,
         brightness_dn_per_s=light_dn / averages.exposure_s,
         ambient_dn_per_s=ambient,
         brightest_dn_per_s=averages.brightest_dn(within) / averages.exposure_s,
