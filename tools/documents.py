@@ -19,9 +19,7 @@ from textwrap import indent
 from typing import Any
 
 import reference  # type: ignore[import-not-found]  # beside this script, no package
-from light_table import (  # type: ignore[import-not-found]  # beside this script, no package
-    with_table,
-)
+from light_table import with_table  # type: ignore[import-not-found]  # beside this script, no package
 
 from transientcam_driver import open_camera
 from transientcam_server.api._app import API, build_app

@@ -107,8 +107,7 @@ def _row(name: str, connections: int, seen: AttackOutcome) -> tuple[Cell, ...]:
         connections,
         seen.frames,
         *map(
-            _seconds,
-            (seen.livez_s, seen.livez_cpu_s, seen.lapse_s, seen.safe_off_s, seen.beside_s),
+            _seconds, (seen.livez_s, seen.livez_cpu_s, seen.lapse_s, seen.safe_off_s, seen.beside_s)
         ),
         f"{seen.grown_bytes / _MIB:.0f} / {seen.left_bytes / _MIB:.0f}",
         _seconds(seen.end_s),

@@ -38,13 +38,7 @@ from transientcam_server.imaging import (
     typical_deviation,
 )
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
-from transientcam_server.planning import (
-    ESTIMATORS,
-    Goal,
-    Planner,
-    SceneStatistics,
-    takes_of,
-)
+from transientcam_server.planning import ESTIMATORS, Goal, Planner, SceneStatistics, takes_of
 from transientcam_server.planning._scene.look import look_of_frame
 from transientcam_server.planning._search.families import FREQUENCY_FACTORS, HARMONICS
 from transientcam_server.settings import SensorSettings, SequenceSettings

@@ -71,7 +71,7 @@ def _tables(neighbours: str, names: list[str], found: list[Judged], others: int)
             "A pixel is wrong where it is off the surface that it sees by more than "
             f"{_WRONG:g} times its `range_error`, right within its interval. Bars: 80 % of the "
             "wrong ones marked, 5 % of the right ones, 85 to 95 % in their interval, whose median "
-            "is at most 3 times the median error. Mirrors are left out.",
+            "is at most 3 times the median error. Mirrors are left out."
         ],
     )
     table.rows.extend((name, *_figures(of)) for name, of in zip(names, found, strict=True))

@@ -71,8 +71,7 @@ def _tables_of(scenes: Mapping[str, str]) -> Iterator[Table]:
     won = {name: Won() for name in COLUMNS}
     for name, scene in scenes.items():
         table = Table(
-            f"{name}: {HEAD}",
-            ("m, takes", "capture / ms", *COLUMNS, "explained", "predicted / mm"),
+            f"{name}: {HEAD}", ("m, takes", "capture / ms", *COLUMNS, "explained", "predicted / mm")
         )
         for m in ORDERS:
             for count in TAKES if m <= MOST_OF_SHORT else TAKES_OF_MANY:

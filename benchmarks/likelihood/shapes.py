@@ -61,7 +61,7 @@ def tables() -> Iterator[Table]:
             notes=[
                 f"f = 23 MHz; every part of a moment has a standard deviation of "
                 f"1/{1 / NOISE_SHARE:.0f} of b_0. likelihood: the average over models, p = "
-                f"{', '.join(map(str, sorted(choice.TAIL_SHAPES)))}.",
+                f"{', '.join(map(str, sorted(choice.TAIL_SHAPES)))}."
             ],
         )
         for each in responses:

@@ -35,7 +35,7 @@ def tables() -> Iterator[Table]:
         notes=[
             "The pass is the compiled `reconstruct`, from raw images to Pisarenko's returns, in "
             "the same run. One return: one model is fitted. Three returns: all models are. With "
-            "the daemon's model error.",
+            "the daemon's model error."
         ],
     )
     for m in ORDERS:

@@ -161,7 +161,7 @@ def table(camera: Camera, directory: Path) -> Table:
             f"frame (`{CAMERA}`, with noise, m = 3), and the share of the pixels that differ by "
             "more than 1 mm. The example divides by gains where the daemon multiplies with their "
             "reciprocals, which rounds otherwise. So do compiled kernels, which the worker of "
-            "`transientcam reconstruct --workers` has, and the others have not.",
+            "`transientcam reconstruct --workers` has, and the others have not."
         ],
     )
     for mode in MODES:

@@ -65,10 +65,7 @@ def measure_start(cache: Path) -> Start:
 def measure_stream(cache: Path, *, duration_s: float) -> Streamed:
     """Return what a client gets that takes range and coefficients for ``duration_s``."""
     environment = {"NUMBA_CACHE_DIR": str(cache)}
-    with (
-        daemon(environment=environment) as running,
-        transientcam.Camera(running.url) as camera,
-    ):
+    with daemon(environment=environment) as running, transientcam.Camera(running.url) as camera:
         applied = camera.configure(**VIDEO)
         latencies_ms, numbers = [], set()
         with camera.stream("range", "coefficients") as frames:

@@ -71,10 +71,7 @@ def tables(wheel: Path | None = None) -> Iterator[Table]:
     The steps are those of docs/start.md; the program is the one that stands there. Installing needs
     the network, and its time is mostly the network's.
     """
-    table = Table(
-        "",
-        heads("after this step | it took, s:.1f | since the beginning, s:.1f"),
-    )
+    table = Table("", heads("after this step | it took, s:.1f | since the beginning, s:.1f"))
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
         built = wheel or build_wheel(directory / "dist")

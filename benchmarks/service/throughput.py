@@ -75,10 +75,7 @@ def daemon_of(daemon: Daemon, camera: str) -> Iterator[Process]:
     """Run the daemon of a checkout once all its kernels are compiled."""
     path = ":".join(str(daemon.tree / name) for name in ("client", "driver", "server"))
     command = [sys.executable, "-c", _SERVE, "--port", "0", "--camera", camera]
-    environment = {
-        "PYTHONPATH": path,
-        "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": daemon.estimator,
-    }
+    environment = {"PYTHONPATH": path, "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": daemon.estimator}
     with running(command, environment) as process:
         process.settle(_COMPILED_WITHIN_S)
         yield process

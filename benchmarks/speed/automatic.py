@@ -76,7 +76,7 @@ def tables() -> Iterator[Table]:
             f"Medians of {_PAIRS} processes of either kind, in turn; later: the median of fifteen "
             "calls. A gain holds the same call of both kinds of processes against each other. "
             "The first call computes with NumPy; then the kernel is loaded from the cache, beside "
-            "what the program does next.",
+            "what the program does next."
         ],
     )
     # processes compute in memory that has been written before, as does the ceiling

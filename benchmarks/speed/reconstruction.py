@@ -83,9 +83,7 @@ def _coefficients() -> Table:
     table = Table(
         f"Moments to coefficients and returns, 163 x 120, m = {_M}, float32",
         ("", "coefficients", "returns"),
-        notes=[
-            f"SciPy solves one matrix a call: extrapolated from {_SAMPLE} pixels.",
-        ],
+        notes=[f"SciPy solves one matrix a call: extrapolated from {_SAMPLE} pixels."],
     )
     b = moments(_M, PAPER).reshape(_M + 1, -1)
     matrix = obvious.toeplitz(b)

@@ -53,7 +53,7 @@ def tables(harmonics: tuple[int, ...] = (6, 3, 8)) -> Iterator[Table]:
         notes=[
             "`sim:mirrors`, the default estimator, which frames have from the first one on: in "
             "NumPy until it is compiled. Seconds from the start of the process, or from `PUT "
-            "/api/v1/sequence`.",
+            "/api/v1/sequence`."
         ],
     )
     with tempfile.TemporaryDirectory() as cache:

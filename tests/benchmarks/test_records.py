@@ -7,15 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.catalogue import MEASUREMENTS
-from benchmarks.common.records import (
-    DOCS,
-    ROOT,
-    Record,
-    changes_since,
-    marked,
-    page_of,
-    rendered,
-)
+from benchmarks.common.records import DOCS, ROOT, Record, changes_since, marked, page_of, rendered
 from benchmarks.common.tables import Column, Table
 
 _MARK = re.compile(r"<!-- measured: (\w+) -->")

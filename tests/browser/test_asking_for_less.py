@@ -83,9 +83,7 @@ def test_a_slow_browser_asks_for_fewer_frames_while_light_plays_unless_it_is_tol
         "title", re.compile("drew [0-9]+ pictures of the light a second")
     )
     choose_from(
-        page,
-        "Page: layout, colours, help",
-        "Ask for less where link or browser is too slow \u2713",
+        page, "Page: layout, colours, help", "Ask for less where link or browser is too slow \u2713"
     )
     expect(sign).to_have_count(0)
     page.context.close()

@@ -68,8 +68,7 @@ def test_what_is_chosen_later_is_requested_of_the_frames_from_then_on(
 def test_frames_come_by_the_stream_where_requests_are_refused(page: Page, watch: Watch) -> None:
     watch.refusals_expected = True
     page.route(
-        re.compile(OF_A_FRAME.pattern.removeprefix("GET ")),
-        lambda route: route.fulfill(status=429),
+        re.compile(OF_A_FRAME.pattern.removeprefix("GET ")), lambda route: route.fulfill(status=429)
     )
     open_page(page)
 

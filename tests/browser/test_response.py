@@ -237,10 +237,7 @@ def test_of_a_held_frame_that_is_not_kept_any_more_it_is_said(
     watch.refusals_expected = True
     held = hold(page, served)
     gone = {"type": "/problems/frame-gone", "title": "Gone", "status": 410}
-    page.route(
-        f"**/frames/{held}/pixel?*",
-        lambda route: route.fulfill(status=410, json=gone),
-    )
+    page.route(f"**/frames/{held}/pixel?*", lambda route: route.fulfill(status=410, json=gone))
     point_at(page, "map", *PIXEL, click=True)
     expect(page.locator(".response-side")).to_contain_text(f"the curves are of frame {held}")
 

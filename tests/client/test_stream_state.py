@@ -194,9 +194,7 @@ def test_another_subscription_keeps_the_token() -> None:
     assert wire.parse_client_message(state.opening(wire.SUBPROTOCOL)) == message
 
 
-def test_a_lost_connection_is_raised_unless_asked_otherwise(
-    recorded: dict[str, Recording],
-) -> None:
+def test_a_lost_connection_is_raised_unless_asked_otherwise(recorded: dict[str, Recording]) -> None:
     state = _state()
     state.received(recorded["hello"].data)
 

@@ -75,11 +75,7 @@ def replayed_here(file: Path) -> Iterator[str]:
 
 @pytest.mark.parametrize(("name", "breaking", "word"), BROKEN, ids=[each[0] for each in BROKEN])
 def test_a_broken_promise_fails_its_check(
-    breakable: Breakable,
-    name: str,
-    breaking: Breaking,
-    word: str,
-    monkeypatch: pytest.MonkeyPatch,
+    breakable: Breakable, name: str, breaking: Breaking, word: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recording, "replayed", replayed_here)
     breakable.breaker.current = breaking
@@ -301,9 +297,7 @@ def test_the_command_fails_and_says_what_is_broken(
     assert failed["promise"] in captured.err
 
 
-def test_the_command_refuses_a_group_that_is_not_there(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_command_refuses_a_group_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["conformance", "http://127.0.0.1:9", "--only", "no-such"]) == 1
 
     assert "no-such" in capsys.readouterr().err

@@ -86,10 +86,7 @@ def test_direct_and_indirect(served: Served) -> None:
 
 
 def test_plan_by_accuracy(served: Served) -> None:
-    restrictions = {
-        "fixed": {"base_frequency_hz": 23e6, "harmonics": 3},
-        "estimator": "pisarenko",
-    }
+    restrictions = {"fixed": {"base_frequency_hz": 23e6, "harmonics": 3}, "estimator": "pisarenko"}
     _, found = run(
         "plan_by_accuracy", url=served.url, targets_m=(0.03, 1e-9), restrictions=restrictions
     )

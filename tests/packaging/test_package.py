@@ -160,9 +160,7 @@ def test_the_wheel_has_every_file_of_the_packages_and_nothing_else(
     assert {f"{within}licenses/LICENSE", f"{within}entry_points.txt"} <= set(names)
 
 
-def test_the_sdist_has_tests_and_documentation_and_nothing_left_behind(
-    unpacked: Path,
-) -> None:
+def test_the_sdist_has_tests_and_documentation_and_nothing_left_behind(unpacked: Path) -> None:
     for name in ("LICENSE", "CITATION.cff", "Makefile", "docs/conf.py", "examples", "benchmarks"):
         assert (unpacked / name).exists(), name
     parts = {part for path in unpacked.rglob("*") for part in path.parts}

@@ -32,11 +32,7 @@ USUAL: Final[Mapping[str, Sequence[str]]] = {
     "tradeoff": ["-o", "tradeoff", "--sequence-grid", "there-is-no-such-grid.toml"],
 }
 """What a verb is given that would work for long, or for ever, with what it requires alone."""
-_TAKEN: Final = {
-    "url": CLOSED,
-    "output": "made.npz",
-    "product": "range",
-}
+_TAKEN: Final = {"url": CLOSED, "output": "made.npz", "product": "range"}
 """What stands for a required parameter of this name; a file that is not there for any other."""
 
 

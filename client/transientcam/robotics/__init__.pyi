@@ -1,10 +1,5 @@
-from ._foxglove_bridge import (
-    SHOWN as SHOWN,
-    FoxgloveBridge as FoxgloveBridge,
-)
-from ._foxglove_messages import (
-    Encoded as Encoded,
-)
+from ._foxglove_bridge import SHOWN as SHOWN, FoxgloveBridge as FoxgloveBridge
+from ._foxglove_messages import Encoded as Encoded
 from ._messages import (
     CAMERA_FRAME as CAMERA_FRAME,
     OPTICAL_FRAME as OPTICAL_FRAME,
@@ -17,16 +12,11 @@ from ._messages import (
     messages_of as messages_of,
     viewable as viewable,
 )
-from ._reports import (
-    Report as Report,
-)
+from ._reports import Report as Report
 from ._rerun_bridge import (
     BINS as BINS,
     LOGGED as LOGGED,
     RerunBridge as RerunBridge,
     blueprint as blueprint,
 )
-from ._source import (
-    Source as Source,
-    captured_s as captured_s,
-)
+from ._source import Source as Source, captured_s as captured_s

@@ -24,7 +24,4 @@ from ._compiling import (
     int64 as int64,
     kernel as kernel,
 )
-from ._image_kernels import (
-    CHUNK as CHUNK,
-    IMAGE_KERNELS as IMAGE_KERNELS,
-)
+from ._image_kernels import CHUNK as CHUNK, IMAGE_KERNELS as IMAGE_KERNELS

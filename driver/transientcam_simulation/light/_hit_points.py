@@ -176,11 +176,7 @@ class Ends:
         return length_m, irradiance
 
     def _clear(
-        self,
-        segment: Segment,
-        mine: NDArray[np.int32],
-        movers: tuple[int, ...],
-        around: Around,
+        self, segment: Segment, mine: NDArray[np.int32], movers: tuple[int, ...], around: Around
     ) -> Plane:
         """Share of the light that all surfaces let through on a segment of its way.
 

@@ -92,9 +92,7 @@ class DenseResponses:
         return edges_s[:-1] + bin_s / 2, mass / bin_s
 
 
-def _summarised(
-    values: NDArray[np.float32],
-) -> list[tuple[NDArray[np.intp], NDArray[np.float64]]]:
+def _summarised(values: NDArray[np.float32]) -> list[tuple[NDArray[np.intp], NDArray[np.float64]]]:
     """Bin and mass of the returns that represent continuous responses."""
     highest = values.argmax(axis=-1)
     total = values.sum(axis=-1, dtype=np.float64)

@@ -16,12 +16,7 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import ask
 from transientcam_simulation.effects import Glimpse, Values
 from transientcam_simulation.light._graded import graded
-from transientcam_simulation.light._over_gloss import (
-    around,
-    of_surfaces,
-    sent_by_gloss,
-    some,
-)
+from transientcam_simulation.light._over_gloss import around, of_surfaces, sent_by_gloss, some
 from transientcam_simulation.light._paths import (
     RayEnds,
     first_scattering,

@@ -17,14 +17,7 @@ from transientcam_simulation.light import (
     _compiled_chunks as compiled_chunks,
     _compiled_overlaps as compiled_overlaps,
 )
-from transientcam_simulation.light._bundle import (
-    Bundle,
-    Region,
-    inside,
-    numbers,
-    overlap,
-    union,
-)
+from transientcam_simulation.light._bundle import Bundle, Region, inside, numbers, overlap, union
 from transientcam_simulation.light._coverage import Plane
 from transientcam_simulation.light._held_light import HeldLight
 from transientcam_simulation.light._hit_points import Ends

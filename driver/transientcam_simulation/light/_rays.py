@@ -47,12 +47,7 @@ def places_within(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def rays_through(
-    view: Viewpoint,
-    column: NDArray[Any],
-    row: NDArray[Any],
-    *,
-    width: int,
-    height: int,
+    view: Viewpoint, column: NDArray[Any], row: NDArray[Any], *, width: int, height: int
 ) -> Points:
     """Return unit vectors through places on the sensor; whole numbers are pixels' centres."""
     right, down, forward = view.axes

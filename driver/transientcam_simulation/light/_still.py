@@ -19,12 +19,7 @@ from transientcam_simulation.light._paths import (
     scatter_of,
     sparse_image,
 )
-from transientcam_simulation.light._rays import (
-    MOST_RAYS,
-    RAYS,
-    RAYS_AT_EDGES,
-    RAYS_AT_THIN,
-)
+from transientcam_simulation.light._rays import MOST_RAYS, RAYS, RAYS_AT_EDGES, RAYS_AT_THIN
 from transientcam_simulation.light._subpixel import PIXELS, crossed, may_be_thin
 from transientcam_simulation.scene import Points, Scene
 

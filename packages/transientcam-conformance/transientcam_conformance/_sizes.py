@@ -84,8 +84,7 @@ def _sequence(device: Device, size_bytes: int) -> dict[str, Any]:
     phases = len(capabilities["sampling"]["phases_rad"]) if fixed else 4
     takes = math.ceil(images / (phases * harmonics))
     skip_unless(
-        takes <= capabilities["max_takes"],
-        f"this camera makes no frame of {size_bytes // MIB} MiB",
+        takes <= capabilities["max_takes"], f"this camera makes no frame of {size_bytes // MIB} MiB"
     )
     half_hz = capabilities["max_frequency_hz"] / harmonics / 2.0
     return {

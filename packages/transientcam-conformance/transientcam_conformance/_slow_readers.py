@@ -49,10 +49,7 @@ def who_does_not_acknowledge_gets_no_more_than_its_credits(device: Device) -> No
 
 
 def _keeps_to_credits(device: Device) -> None:
-    with (
-        device.stream("range") as steady,
-        device.stream("range", credit=2) as slow,
-    ):
+    with device.stream("range") as steady, device.stream("range", credit=2) as slow:
         first, second = slow.frame(), slow.frame()
         newest = steady.frame(lambda each: each.frame >= second.frame + 4)
         slow.acknowledge(second.frame)

@@ -28,8 +28,7 @@ def conformance(
         typer.Option(metavar="GROUP", help="Only the checks of this group; may be repeated."),
     ] = None,
     quick: Annotated[
-        bool,
-        typer.Option("--quick", help=f"Skip the slow checks: {', '.join(SLOW)}."),
+        bool, typer.Option("--quick", help=f"Skip the slow checks: {', '.join(SLOW)}.")
     ] = False,
     timeout_s: Annotated[
         float,

@@ -17,13 +17,7 @@ from transientcam_driver.cameras.open_usb import (
     udev_rule,
 )
 from transientcam_opt8241._device import PRODUCT
-from transientcam_opt8241._link import (
-    FRAME_ENDPOINT,
-    PRODUCT_ID,
-    TIMEOUT_MS,
-    VENDOR_ID,
-    Request,
-)
+from transientcam_opt8241._link import FRAME_ENDPOINT, PRODUCT_ID, TIMEOUT_MS, VENDOR_ID, Request
 
 UDEV_RULE = udev_rule(VENDOR_ID, PRODUCT_ID)
 _PACKET_BYTES = 512  # of USB 2; reads are multiples of it, so that none overflows

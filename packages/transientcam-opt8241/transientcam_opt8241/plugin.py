@@ -64,8 +64,5 @@ PLUGIN: Final = CameraPlugin(
     find=_find,
     check=_check,
     facts=_facts,
-    options={
-        "phases": "4 or 6 of each frequency; 4 without it",
-        **OF_EMULATION,
-    },
+    options={"phases": "4 or 6 of each frequency; 4 without it", **OF_EMULATION},
 )

@@ -105,7 +105,7 @@ def _remarks(outcomes: _Outcomes) -> list[str]:
         "The paper does not print the parameters of its responses; ours are two sharp returns "
         "(7 ns, 14 ns; 1 : 0.6) and three exponentially modified Gaussians (6, 13 and 24 ns; "
         "1 : 0.7 : 0.5). Noise: every real measurement gets a Gaussian error of 1/70 of b_0, the "
-        "same for all techniques: those that use more frequencies have more images to work with.",
+        "same for all techniques: those that use more frequencies have more images to work with."
     ]
     for case in _CASES:
         for name, of in (("without noise", "clean_error"), ("at 70 : 1", "noisy_error")):

@@ -10,13 +10,7 @@ from typing import Any, Final
 
 from numba import njit
 
-from transientcam_moments._kernels.arrays import (
-    ComplexPlanes,
-    Counts,
-    Flags,
-    RealPlane,
-    RealPlanes,
-)
+from transientcam_moments._kernels.arrays import ComplexPlanes, Counts, Flags, RealPlane, RealPlanes
 from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue
 from transientcam_moments._kernels.outputs import flag_and_bias

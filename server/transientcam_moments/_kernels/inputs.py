@@ -5,13 +5,7 @@ from typing import Any
 from numba import njit
 
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import (
-    ComplexPlanes,
-    Flags,
-    Images,
-    RealPlane,
-    RealPlanes,
-)
+from transientcam_moments._kernels.arrays import ComplexPlanes, Flags, Images, RealPlane, RealPlanes
 from transientcam_moments._kernels.portable import larger, select, some
 from transientcam_moments.arrays import Length, Plane
 from transientcam_moments.images import phasors

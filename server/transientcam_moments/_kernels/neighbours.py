@@ -10,13 +10,7 @@ from numba import njit
 from transientcam_compiled import Spread, at_once
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import (
-    Complexes,
-    Places,
-    RealPlane,
-    RealPlanes,
-    Reals,
-)
+from transientcam_moments._kernels.arrays import Complexes, Places, RealPlane, RealPlanes, Reals
 from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.portable import bank, larger, select, smaller, tiny
 from transientcam_moments.arrays import Length, Plane

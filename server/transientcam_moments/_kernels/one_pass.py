@@ -11,13 +11,7 @@ import numpy as np
 
 from transientcam_compiled import BLOCK, Spread, empty
 from transientcam_moments._dispatch import LEAST_PIXELS
-from transientcam_moments._kernels.arrays import (
-    Booleans,
-    Complexes,
-    FlatReturns,
-    Images,
-    Reals,
-)
+from transientcam_moments._kernels.arrays import Booleans, Complexes, FlatReturns, Images, Reals
 from transientcam_moments._kernels.padding import normalisation, row_length
 
 if TYPE_CHECKING:  # it brings along the compiler

@@ -19,12 +19,7 @@ from transientcam_moments._kernels.arrays import (
     WideRealPlanes,
 )
 from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
-from transientcam_moments._kernels.portable import (
-    bank,
-    not_a_number,
-    select,
-    some,
-)
+from transientcam_moments._kernels.portable import bank, not_a_number, select, some
 from transientcam_moments.arrays import Length
 from transientcam_moments.moment_problem import eigenvalue as eigenvalues, sparse
 

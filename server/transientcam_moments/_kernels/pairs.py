@@ -208,10 +208,7 @@ def _choose(
         costs[f], directs[2 * f], directs[2 * f + 1] = cost, dx, dy
         better = cost < best
         best = select(better, cost, best)
-        bx_direct, by_direct = (
-            select(better, dx, bx_direct),
-            select(better, dy, by_direct),
-        )
+        bx_direct, by_direct = (select(better, dx, bx_direct), select(better, dy, by_direct))
         for k in range(2):
             bx[k] = select(better, x[k], bx[k]) if f > 0 else x[k]
             by[k] = select(better, y[k], by[k]) if f > 0 else y[k]

@@ -16,11 +16,7 @@ from transientcam_moments._kernels.arrays import (
     Reals,
 )
 from transientcam_moments._kernels.compiled_entry import entry
-from transientcam_moments._kernels.portable import (
-    bank,
-    not_a_number,
-    select,
-)
+from transientcam_moments._kernels.portable import bank, not_a_number, select
 from transientcam_moments.arrays import Length
 from transientcam_moments.moment_problem import maxima
 

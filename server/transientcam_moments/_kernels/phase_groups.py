@@ -8,13 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels.arrays import (
-    RealPlane,
-    RealPlanes,
-    Reals,
-    Table,
-    WideRealPlane,
-)
+from transientcam_moments._kernels.arrays import RealPlane, RealPlanes, Reals, Table, WideRealPlane
 from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments.arrays import Length
 

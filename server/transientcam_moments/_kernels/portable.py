@@ -55,15 +55,7 @@ from transientcam_moments.arrays import (
     tiny,
 )
 from transientcam_moments.images import phasors
-from transientcam_moments.likelihood import (
-    choice,
-    linear,
-    pair_fit,
-    scaled,
-    sharp,
-    start,
-    tail,
-)
+from transientcam_moments.likelihood import choice, linear, pair_fit, scaled, sharp, start, tail
 from transientcam_moments.moment_problem import (
     circle,
     eigenvalue,

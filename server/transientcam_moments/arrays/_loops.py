@@ -17,13 +17,7 @@ _RELEASES = frozenset((4, 5, 6, 7, 8, 10, 12, 14, 17, 20, 24, 29, 35, 42, 50, 60
 
 
 def repeat(
-    body: Step,
-    steps: int,
-    fixed: State,
-    given: State,
-    state: State,
-    *,
-    alike: bool = False,
+    body: Step, steps: int, fixed: State, given: State, state: State, *, alike: bool = False
 ) -> State:
     """Apply ``state = body(first, fixed, given, state)`` until no pixel moves.
 
@@ -65,13 +59,7 @@ def repeat(
     return state
 
 
-def _repeat_numpy(
-    body: Step,
-    steps: int,
-    fixed: State,
-    given: State,
-    state: State,
-) -> State:
+def _repeat_numpy(body: Step, steps: int, fixed: State, given: State, state: State) -> State:
     results: list[np.ndarray[Any, Any]] = []
     active: Any = slice(None)
     for step in range(1, steps + 1):
@@ -114,13 +102,7 @@ def _of_pixels(state: State, pixels: Any) -> State:
     return _with(state, (plane[pixels] for plane in _planes(state)))
 
 
-def _repeat_jax(
-    body: Step,
-    steps: int,
-    fixed: State,
-    given: State,
-    state: State,
-) -> State:
+def _repeat_jax(body: Step, steps: int, fixed: State, given: State, state: State) -> State:
     from jax import lax
 
     def more(carry: tuple[Any, State]) -> Any:

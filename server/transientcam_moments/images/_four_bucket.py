@@ -15,11 +15,7 @@ from transientcam_moments.arrays import (
     to_complex,
 )
 from transientcam_moments.errors import ParameterError, ShapeError
-from transientcam_moments.images._phase_steps import (
-    FOUR_PHASES_RAD,
-    is_four_bucket,
-    phase_weights,
-)
+from transientcam_moments.images._phase_steps import FOUR_PHASES_RAD, is_four_bucket, phase_weights
 from transientcam_moments.images._takes import average_takes
 
 ZEROTH_IMAGES = {"low-frequency": 4, "on-off": 2, "estimated": 0}

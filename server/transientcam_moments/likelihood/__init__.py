@@ -11,9 +11,7 @@ from transientcam_moments.likelihood import (
     _tail as tail,
 )
 from transientcam_moments.likelihood._chi_square import SIGNIFICANCE, ambiguous, chi_square_quantile
-from transientcam_moments.likelihood._choice import (
-    MOST_RETURNS,
-)
+from transientcam_moments.likelihood._choice import MOST_RETURNS
 from transientcam_moments.likelihood._estimate import (
     CORRECTED_ERROR,
     MODEL_ERROR,

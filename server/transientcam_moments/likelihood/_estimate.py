@@ -20,12 +20,7 @@ from transientcam_moments.arrays import (
 )
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import _scaled as scaled
-from transientcam_moments.likelihood._chi_square import (
-    SIGNIFICANCE,
-    ambiguous,
-    explained,
-    reduced,
-)
+from transientcam_moments.likelihood._chi_square import SIGNIFICANCE, ambiguous, explained, reduced
 from transientcam_moments.likelihood._choice import MOST_RETURNS, TAIL_SHAPES
 from transientcam_moments.likelihood._planar import Data, fit
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns, Separation, separate
@@ -289,10 +284,7 @@ def fitted(
 
 
 def dense(
-    planes: Array,
-    noise: MomentNoise,
-    harmonics: Sequence[int] | None,
-    trailing: tuple[int, ...],
+    planes: Array, noise: MomentNoise, harmonics: Sequence[int] | None, trailing: tuple[int, ...]
 ) -> tuple[Array, Array]:
     """Return moments and variance (m + 1, P) with planes of zeros for what was not measured."""
     places = places_of(harmonics, planes.shape[0])

@@ -8,11 +8,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from transientcam_moments.arrays import Array, namespace, repeat, select, some
-from transientcam_moments.likelihood import (
-    _sharp as sharp,
-    _start as start,
-    _tail as tail,
-)
+from transientcam_moments.likelihood import _sharp as sharp, _start as start, _tail as tail
 from transientcam_moments.likelihood._choice import (
     DELAY_RAD,
     LATE_STEPS,

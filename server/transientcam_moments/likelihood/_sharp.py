@@ -368,13 +368,7 @@ def step(
 
 
 def deviations(
-    order: Length,
-    returns: Length,
-    unknowns: Length,
-    weight: Bank,
-    x: Bank,
-    y: Bank,
-    out: Bank,
+    order: Length, returns: Length, unknowns: Length, weight: Bank, x: Bank, y: Bank, out: Bank
 ) -> None:
     """Put the variances of weights, then of phases times weights, in `out`."""
     pr, pi = product_bank(weight[0], order, returns), product_bank(weight[0], order, returns)

@@ -20,12 +20,7 @@ from transientcam_moments.arrays import (
     summary,
 )
 from transientcam_moments.errors import ParameterError
-from transientcam_moments.likelihood._chi_square import (
-    SIGNIFICANCE,
-    ambiguous,
-    explained,
-    reduced,
-)
+from transientcam_moments.likelihood._chi_square import SIGNIFICANCE, ambiguous, explained, reduced
 from transientcam_moments.likelihood._estimate import places_of, variance_of
 from transientcam_moments.moment_problem import Separation
 from transientcam_moments.noise import MomentNoise, free_of_scale

@@ -81,11 +81,7 @@ def smallest_eigenvalue(b: Array) -> Array:
 
 
 def bias(
-    b: Array,
-    epsilon: float = EPSILON,
-    *,
-    keep: str = "harmonics",
-    eigenvalue: Array | None = None,
+    b: Array, epsilon: float = EPSILON, *, keep: str = "harmonics", eigenvalue: Array | None = None
 ) -> Biased:
     """Make moments valid wherever they are not: smallest eigenvalue >= epsilon b_0 afterwards.
 

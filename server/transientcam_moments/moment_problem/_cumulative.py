@@ -15,11 +15,7 @@ from transientcam_moments.arrays import (
     to_complex,
 )
 from transientcam_moments.moment_problem import _maxima as maxima
-from transientcam_moments.moment_problem._levinson import (
-    Coefficients,
-    from_reflection,
-    moments_of,
-)
+from transientcam_moments.moment_problem._levinson import Coefficients, from_reflection, moments_of
 
 _BLOCK_VALUES = 1 << 16
 _TOLERANCE = 1e-11  # of the closed form, relative to b_0, before quadrature takes over

@@ -56,12 +56,7 @@ def least_zeroth(smallest: Plane, epsilon: Plane | float) -> tuple[Plane, Plane]
 
 
 def margin(
-    order: Length,
-    re: Bank,
-    im: Bank,
-    smallest: Plane,
-    epsilon: Plane | float,
-    least: Plane | float,
+    order: Length, re: Bank, im: Bank, smallest: Plane, epsilon: Plane | float, least: Plane | float
 ) -> tuple[Mask, Mask, Mask, Plane, Plane, Plane]:
     """Flag and bias moments whose smallest eigenvalue is known (Sec. 4.3).
 

@@ -216,11 +216,7 @@ def _levinson(b: Array, *brightness: Array) -> tuple[Array, Array, Array]:
         gr, gi = bank(re[0], order, 0), bank(re[0], order, 0)
         error = total * toeplitz.levinson(order, re, im, ar, ai, gr, gi)
     ar[0], ai[0] = xp.ones_like(error), xp.zeros_like(error)
-    return (
-        error,
-        to_complex(xp.stack(ar), xp.stack(ai)),
-        to_complex(xp.stack(gr), xp.stack(gi)),
-    )
+    return (error, to_complex(xp.stack(ar), xp.stack(ai)), to_complex(xp.stack(gr), xp.stack(gi)))
 
 
 def normalised(b: Array, *brightness: Array) -> tuple[list[Array], list[Array], Array]:

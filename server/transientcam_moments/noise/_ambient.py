@@ -75,8 +75,7 @@ def _any(images: Array, brightness: Array, sensor: Sensor | ImageNoise) -> bool:
     signal = images.reshape((len(images), -1))[:, ::step].mean(axis=0) - sensor.dark_dn
     variance = sensor.image_variance(half)
     least = np.maximum(
-        _DEVIATIONS * np.sqrt(variance / len(images)),
-        _COUNTS * variance * sensor.gain_e_per_dn,
+        _DEVIATIONS * np.sqrt(variance / len(images)), _COUNTS * variance * sensor.gain_e_per_dn
     )
     with np.errstate(invalid="ignore"):
         more = np.count_nonzero(signal - half > least)

@@ -3,9 +3,7 @@
 import numpy as np
 
 from transientcam_moments.arrays import Array, in_range, moment_planes, phases, squared
-from transientcam_moments.moment_problem import (
-    EPSILON,
-)
+from transientcam_moments.moment_problem import EPSILON
 from transientcam_moments.noise._moments import MomentNoise
 
 _BLOCK_VALUES = 1 << 17

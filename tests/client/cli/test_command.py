@@ -120,9 +120,7 @@ def test_an_interrupt_is_no_traceback(install: _Install) -> None:
 
 
 def test_a_verb_without_its_packages_says_what_to_install(
-    install: _Install,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    install: _Install, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(verbs._EXTRA_OF_PACKAGE, "package_that_is_not_there", "server")
     install(missing="package_that_is_not_there.commands")

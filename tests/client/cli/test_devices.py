@@ -189,10 +189,7 @@ def test_each_kind_says_how_its_names_are_written(capsys: pytest.CaptureFixture[
     ],
 )
 def test_a_plug_in_that_fails_hides_no_other(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    value: str,
-    problem: str,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], value: str, problem: str
 ) -> None:
     points = [
         EntryPoint("odd", value, devices.GROUP),

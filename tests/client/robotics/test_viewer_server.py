@@ -116,11 +116,7 @@ def test_who_is_refused_reads_changes_and_lights_nothing(
 
 @pytest.mark.parametrize(
     ("options", "changes", "lights"),
-    [
-        ({}, False, False),
-        ({"control": True}, True, False),
-        ({"control_light": True}, True, True),
-    ],
+    [({}, False, False), ({"control": True}, True, False), ({"control_light": True}, True, True)],
 )
 def test_who_enters_does_what_the_bridge_was_given(
     options: dict[str, bool], changes: bool, lights: bool

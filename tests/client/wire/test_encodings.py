@@ -85,9 +85,7 @@ def test_the_density_of_reflection16_is_within_half_a_percent_and_seldom_beyond_
     assert np.quantile(error.max(axis=0), 0.99) < 0.1
 
 
-@given(
-    codes=hnp.arrays(np.uint16, (6, 4), elements=st.integers(0, 65535)),
-)
+@given(codes=hnp.arrays(np.uint16, (6, 4), elements=st.integers(0, 65535)))
 def test_any_codes_are_a_density_that_is_nowhere_negative(codes: NDArray[np.uint16]) -> None:
     coefficients = wire.decode_reflection16(codes, np.ones(4, np.float32))
     values = density(coefficients.astype(np.float64), _PHASES_RAD)

@@ -307,10 +307,7 @@ def test_a_frame_that_states_no_time_of_encoding_took_none() -> None:
             {"subscriptions": [{"product": "range", "max_rate_hz": True}]},
             "subscriptions[0].max_rate_hz",
         ),
-        (
-            {"subscriptions": [{"product": "range", "decimation": 0}]},
-            "subscriptions[0].decimation",
-        ),
+        ({"subscriptions": [{"product": "range", "decimation": 0}]}, "subscriptions[0].decimation"),
         (
             {"subscriptions": [{"product": "range", "decimation": 65}]},
             "subscriptions[0].decimation",
@@ -323,10 +320,7 @@ def test_a_frame_that_states_no_time_of_encoding_took_none() -> None:
             {"subscriptions": [{"product": "range", "region": [-1, 0, 8, 8]}]},
             "subscriptions[0].region[0]",
         ),
-        (
-            {"subscriptions": [{"product": "range", "region": [0, 0, 8]}]},
-            "subscriptions[0].region",
-        ),
+        ({"subscriptions": [{"product": "range", "region": [0, 0, 8]}]}, "subscriptions[0].region"),
         (
             {"subscriptions": [{"product": "range", "region": [0, 0, 8, 8, 8]}]},
             "subscriptions[0].region",
@@ -432,10 +426,7 @@ def test_the_limits_of_a_channel_are_part_of_it(change: dict[str, Any]) -> None:
         {"channel": None},
         {"meta": {"frame": 0}},
         {"meta": {"frame": 2**53 - 1}},
-        {
-            "axes": ["x"] * 6,
-            "array": {"dtype": "|u1", "shape": [1] * 6, "data": b"\0"},
-        },
+        {"axes": ["x"] * 6, "array": {"dtype": "|u1", "shape": [1] * 6, "data": b"\0"}},
     ],
 )
 def test_the_limits_of_a_frame_are_part_of_it(change: dict[str, Any]) -> None:

@@ -95,11 +95,7 @@ def test_harmonics_may_come_in_any_order_and_with_gaps() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "field"),
-    [
-        ({"epsilon": -0.1}, "epsilon"),
-        ({"bins": 6}, "bins"),
-    ],
+    ("arguments", "field"), [({"epsilon": -0.1}, "epsilon"), ({"bins": 6}, "bins")]
 )
 def test_arguments_that_it_cannot_work_with_are_refused(
     arguments: dict[str, float], field: str

@@ -57,9 +57,7 @@ def test_likelihoods_are_right_with_the_worst_quotients_that_a_device_may_have(
         assert another._check("likelihood", m).result() == ""
 
 
-def test_a_device_whose_likelihood_is_spoilt_is_not_asked(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_device_whose_likelihood_is_spoilt_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     right = likelihood_shader
 
     def spoilt(*args: Any, **given: Any) -> str:

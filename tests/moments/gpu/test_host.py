@@ -250,9 +250,7 @@ def test_odd_shapes_are_computed_alike(
     assert np.allclose(found.direct, expected.direct, rtol=1e-2, atol=2)
 
 
-def test_devices_are_listed_with_what_real_ones_make_wrong(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_devices_are_listed_with_what_real_ones_make_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     class Wrong(Device):
         def adapters(self) -> list[Adapter]:
             return [GPU, SOFTWARE]

@@ -181,8 +181,7 @@ def test_loading_begins_when_the_first_call_has_returned(
 
 
 def test_memory_for_the_results_of_the_next_call_is_there_with_its_kernel(
-    anew: None,
-    monkeypatch: pytest.MonkeyPatch,
+    anew: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pool, loaded = Pool(), threading.Event()
 

@@ -11,12 +11,7 @@ from scipy.stats import chi2, gamma
 
 import transientcam_moments as tm
 from tests.moments.oracles import moments_of_returns
-from transientcam_moments.likelihood import (
-    _chi_square as chi_square,
-    choice,
-    sharp,
-    tail,
-)
+from transientcam_moments.likelihood import _chi_square as chi_square, choice, sharp, tail
 
 NOISE_SHARE = 1 / 100
 

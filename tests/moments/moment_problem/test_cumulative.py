@@ -6,11 +6,7 @@ from scipy.integrate import quad
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments.moment_problem._cumulative import (
-    _TOLERANCE,
-    _closed_form,
-    _quadrature,
-)
+from transientcam_moments.moment_problem._cumulative import _TOLERANCE, _closed_form, _quadrature
 
 
 @pytest.mark.parametrize("m", [1, 2, 3, 4, 8, 16, 32])

@@ -69,10 +69,7 @@ def test_the_memory_of_former_frames_is_reported_with_its_limit(
 
 def test_recordings_are_counted_with_why_they_ended(tmp_path: Path) -> None:
     kept = {"directory": tmp_path, "min_free_bytes": 0}
-    with (
-        serving(recordings=kept) as daemon,
-        httpx.Client(base_url=daemon.url, timeout=60) as http,
-    ):
+    with serving(recordings=kept) as daemon, httpx.Client(base_url=daemon.url, timeout=60) as http:
         before = scrape(http)
         first = http.post("/api/v1/recordings", json={"frames": 2}).json()["id"]
         wait_until(lambda: http.get(f"/api/v1/recordings/{first}").json()["state"] == "complete")

@@ -154,9 +154,7 @@ def test_a_new_subscription_forgets_the_frames_of_the_old_one() -> None:
 
 
 @given(
-    rate_hz=st.floats(0.5, 40.0),
-    frame_rate_hz=st.floats(1.0, 60.0),
-    frames=st.integers(50, 300),
+    rate_hz=st.floats(0.5, 40.0), frame_rate_hz=st.floats(1.0, 60.0), frames=st.integers(50, 300)
 )
 def test_a_rate_limit_holds_on_average_and_never_drops(
     rate_hz: float, frame_rate_hz: float, frames: int

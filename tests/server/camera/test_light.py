@@ -10,13 +10,7 @@ import pytest
 from tests.server.camera.test_acquisition import PATIENCE_S, ScriptedCamera
 from tests.waiting import wait_until
 from transientcam_driver import Camera, CameraError, CameraState, open_camera
-from transientcam_server.camera import (
-    Acquisition,
-    Dark,
-    Event,
-    LightGuard,
-    LightOffEvent,
-)
+from transientcam_server.camera import Acquisition, Dark, Event, LightGuard, LightOffEvent
 from transientcam_server.camera._light import LATE_S
 
 

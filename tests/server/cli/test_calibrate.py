@@ -56,11 +56,7 @@ def test_the_result_is_printed_as_json(tmp_path: Path, capfd: pytest.CaptureFixt
     ],
 )
 def test_what_cannot_be_done_is_said_and_nothing_written(
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-    arguments: list[str],
-    code: int,
-    message: str,
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], arguments: list[str], code: int, message: str
 ) -> None:
     out = tmp_path / "c.npz"
 

@@ -39,9 +39,7 @@ def served() -> Iterator[Served]:
 
 
 def test_walls_that_are_shown_one_after_the_other_give_settings_of_the_lens(
-    served: Served,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
+    served: Served, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     shown = [(0.8, 0.2), (-0.4, 0.8)]
     with Camera(served.url) as camera:

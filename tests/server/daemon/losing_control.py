@@ -96,12 +96,7 @@ class Control:
     """A daemon before a camera, both of which are there as soon as they are needed."""
 
     def __init__(
-        self,
-        zygote: Zygote,
-        camera: EmulatedCamera,
-        folder: Path,
-        silence_s: float,
-        dark_s: float,
+        self, zygote: Zygote, camera: EmulatedCamera, folder: Path, silence_s: float, dark_s: float
     ) -> None:
         self.camera = camera
         self._zygote = zygote

@@ -19,10 +19,7 @@ def nothing_set(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def load(
-    *,
-    file: Path | None = None,
-    environment: dict[str, str] | None = None,
-    **command_line: object,
+    *, file: Path | None = None, environment: dict[str, str] | None = None, **command_line: object
 ) -> Settings:
     return load_settings(command_line, file=file, environment=environment or {})
 
@@ -71,11 +68,7 @@ def test_every_mistake_is_listed_with_its_place(tmp_path: Path) -> None:
     file.write_text("bogus = 2\n[reconstruction]\nbias = -1.0\nfoo = 1\n")
 
     with pytest.raises(SettingsError) as caught:
-        load(
-            file=file,
-            environment={"TRANSIENTCAM_STREAM__QUEUE_FRAMES": "many"},
-            port=99999,
-        )
+        load(file=file, environment={"TRANSIENTCAM_STREAM__QUEUE_FRAMES": "many"}, port=99999)
 
     places = {mistake.place: mistake for mistake in caught.value.mistakes}
     assert set(places) == {
@@ -167,9 +160,7 @@ def test_each_setting_has_where_it_was_given(tmp_path: Path) -> None:
     file.write_text('camera = "usb"\nport = 1\n[stream]\nmax_clients = 5\n')
 
     places = load_with_places(
-        {"port": 3, "host": None},
-        file=file,
-        environment={"TRANSIENTCAM_STREAM__QUEUE_FRAMES": "3"},
+        {"port": 3, "host": None}, file=file, environment={"TRANSIENTCAM_STREAM__QUEUE_FRAMES": "3"}
     ).places
 
     assert places.given(("port",)) == "--port"
@@ -261,9 +252,7 @@ def test_a_loopback_address_needs_nothing(host: str) -> None:
 @pytest.mark.parametrize("value", ["nan", "inf", "-0.1"])
 def test_a_number_must_be_finite_and_in_range(value: str) -> None:
     with pytest.raises(SettingsError, match="SMOOTHING_PX"):
-        load(
-            environment={"TRANSIENTCAM_RECONSTRUCTION__SMOOTHING_PX": value},
-        )
+        load(environment={"TRANSIENTCAM_RECONSTRUCTION__SMOOTHING_PX": value})
 
 
 def test_settings_are_frozen() -> None:

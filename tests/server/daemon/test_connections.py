@@ -61,13 +61,7 @@ def problem(answer: bytes) -> tuple[int, dict[str, Any]]:
 
 
 @pytest.mark.parametrize(
-    "begun",
-    [
-        b"",
-        b"GET",
-        b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ",
-        b"\r\n\r\n",
-    ],
+    "begun", [b"", b"GET", b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ", b"\r\n\r\n"]
 )
 def test_a_head_that_does_not_end_is_given_up(begun: bytes) -> None:
     with limited(head_s=0.2) as served, raw(served, begun) as connection:

@@ -243,10 +243,7 @@ def test_each_thread_reads_into_a_buffer_of_its_own() -> None:
 
 
 SAFE_OFF = b"POST /api/v1/acquisition/safe-off HTTP/1.1\r\nHost: lab\r\n\r\n"
-STOP = (
-    b"PUT /api/v1/acquisition HTTP/1.1\r\nContent-Length: 18\r\n\r\n",
-    b'{"running": false}',
-)
+STOP = (b"PUT /api/v1/acquisition HTTP/1.1\r\nContent-Length: 18\r\n\r\n", b'{"running": false}')
 READ = b"GET /livez HTTP/1.1\r\n\r\n"
 
 

@@ -48,12 +48,7 @@ class ClosedForm:
         return std_m, bias_m, math.hypot(std_m, bias_m)
 
     def predict(
-        self,
-        estimator: str,
-        sequence: Sequence,
-        *,
-        closely: bool = False,
-        capture_s: float = 0.0,
+        self, estimator: str, sequence: Sequence, *, closely: bool = False, capture_s: float = 0.0
     ) -> Prediction:
         each = self.quick(estimator, sequence, self.noise_scale(sequence))
         std, error = (

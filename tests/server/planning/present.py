@@ -59,12 +59,7 @@ class Bench:
         opened = cast(Any, (lambda: "twin") if twin else None)
         self.looks = Looks(planner, workers, queue, opened, clock=lambda: self.now_s)
         self.fronts = FrontCache(
-            planner,
-            workers,
-            queue,
-            self.looks,
-            simulated=simulated,
-            clock=lambda: self.now_s,
+            planner, workers, queue, self.looks, simulated=simulated, clock=lambda: self.now_s
         )
 
     async def looked(self, base: Sequence = BASE, ambient: float | None = None) -> Any:

@@ -24,10 +24,6 @@ def test_pixels_with_a_range_and_direct_light_count() -> None:
     found = errors([1.3, 2.6, none, 3.0, 9.0, 9.0], [1.0, 3.0, 5.0, none, 9.0, 1.0], unlit=(5,))
 
     assert found == pytest.approx(
-        {
-            "median": 0.3,
-            "rms": np.sqrt((0.3**2 + 0.4**2) / 3),
-            "no_direct_light_share": 1 / 6,
-        }
+        {"median": 0.3, "rms": np.sqrt((0.3**2 + 0.4**2) / 3), "no_direct_light_share": 1 / 6}
     )
     assert errors([none, 1.0], [1.0, none]) is None

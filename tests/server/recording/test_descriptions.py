@@ -16,11 +16,7 @@ OF_HEADER: dict[str, Any] = {
     "name": "Möbius strip, 3 m",
     "started_s": 1795161600.25,
     "sequence": APPLIED.to_document(),
-    "camera": {
-        "model": CAPABILITIES.model,
-        "serial": CAPABILITIES.serial,
-        **header().camera,
-    },
+    "camera": {"model": CAPABILITIES.model, "serial": CAPABILITIES.serial, **header().camera},
     "calibration": {"id": "nominal"},
     "width": 16,
     "height": 12,

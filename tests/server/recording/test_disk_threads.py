@@ -155,10 +155,7 @@ def test_a_service_whose_disk_hangs_serves_all_else_and_ends_when_it_is_to(
     # not a frame, which is kept once it was read
     parts = f"/api/v1/recordings/{recording}/zarr/.zmetadata"
     wait_until(lambda: client.get(parts).status_code == 503)
-    for method, path in (
-        ("GET", parts),
-        ("GET", f"/api/v1/recordings/{recording}/frames/1"),
-    ):
+    for method, path in (("GET", parts), ("GET", f"/api/v1/recordings/{recording}/frames/1")):
         answer = client.request(method, path)
         assert (answer.status_code, answer.json()["type"]) == (503, "/problems/disk-stalled"), path
         assert int(answer.headers["retry-after"]) >= 1

@@ -30,8 +30,7 @@ def test_the_end_of_the_scale_is_the_highest_code_of_the_converter() -> None:
 
 
 @pytest.mark.parametrize(
-    "changes",
-    [None, 12, {}, {"gain_e_per_dn": 0.0}, {"bits": 12.5}, {"dark_dn": float("nan")}],
+    "changes", [None, 12, {}, {"gain_e_per_dn": 0.0}, {"bits": 12.5}, {"dark_dn": float("nan")}]
 )
 def test_a_file_without_a_sensor_or_with_an_impossible_one_has_none(changes: Any) -> None:
     sensor = asdict(SENSOR) | changes if changes and isinstance(changes, dict) else changes

@@ -167,10 +167,7 @@ def test_a_lease_at_the_origin_binds_the_relay(
             with pytest.raises(transientcam.ProblemError, match="alignment") as refused:
                 change()
             assert refused.value.type == "/problems/lease-held"
-        with (
-            pytest.raises(transientcam.ProblemError, match="alignment"),
-            at_relay.lease("bench"),
-        ):
+        with pytest.raises(transientcam.ProblemError, match="alignment"), at_relay.lease("bench"):
             pass
         assert at_relay.acquisition["running"]
     with at_relay.lease("bench"):  # the one that was refused is not held here either

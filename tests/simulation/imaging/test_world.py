@@ -65,8 +65,7 @@ def phasor(weights: tuple[float, ...], delays_s: tuple[float, ...], f_hz: float)
 
 
 @pytest.mark.parametrize(
-    "sub_phases",
-    [SubPhases("arccos", 8), SubPhases("none"), SubPhases("harmonic-cancellation", 3)],
+    "sub_phases", [SubPhases("arccos", 8), SubPhases("none"), SubPhases("harmonic-cancellation", 3)]
 )
 def test_images_follow_the_measurement_model(sub_phases: SubPhases) -> None:
     weights, delays_s = (0.5, 0.3, 0.1), (11.3e-9, 19.3e-9, 26.7e-9)

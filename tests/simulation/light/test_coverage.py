@@ -56,9 +56,7 @@ def test_two_shapes_overlap_in_a_pixel_as_their_borders_lie(
 
 
 @pytest.mark.parametrize("shape", [(9, 11), (1, 11), (9, 1), (1, 1), (2, 2), (0, 5)])
-def test_shares_are_all_or_nothing_away_from_borders_up_to_the_edge(
-    shape: tuple[int, int],
-) -> None:
+def test_shares_are_all_or_nothing_away_from_borders_up_to_the_edge(shape: tuple[int, int]) -> None:
     y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
     inside = (3.0 - np.hypot(x - 4.2, y - 3.7)).astype(np.float32)
     inside[(x + 2 * y) % 7 == 0] = np.nan

@@ -13,13 +13,7 @@ from transientcam_simulation.effects import Noise
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.imaging import World
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._facts import (
-    MOVING_S,
-    PAIR_S,
-    STILL_S,
-    TURNED_S,
-    SceneFacts,
-)
+from transientcam_simulation.light._facts import MOVING_S, PAIR_S, STILL_S, TURNED_S, SceneFacts
 from transientcam_simulation.light._further_light import FurtherLight
 from transientcam_simulation.light._held_light import HeldLight, StillEnds, held_light
 from transientcam_simulation.light._patches import Patches

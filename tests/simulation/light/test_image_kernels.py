@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 
 from transientcam_compiled import THREAD
-from transientcam_simulation.compiled._image_kernels import (
-    OF_IMAGES,
-    WORTH_PIXELS,
-    ImageKernels,
-)
+from transientcam_simulation.compiled._image_kernels import OF_IMAGES, WORTH_PIXELS, ImageKernels
 from transientcam_simulation.light import _compiled_tiles as compiled_tiles
 
 

@@ -62,11 +62,7 @@ def test_the_median_is_taken_for_background_and_nothing_falls_below_zero(tmp_pat
 
 @pytest.mark.parametrize(
     ("choice", "zero_s"),
-    [
-        ({}, 0.0),
-        ({"time_zero": "peak"}, 2.5e-10),
-        ({"time_zero_s": 7e-10}, 7e-10),
-    ],
+    [({}, 0.0), ({"time_zero": "peak"}, 2.5e-10), ({"time_zero_s": 7e-10}, 7e-10)],
 )
 def test_time_zero_begins_the_first_bin_or_is_the_peak_or_a_time(
     tmp_path: Path, choice: dict[str, Any], zero_s: float

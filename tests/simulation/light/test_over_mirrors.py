@@ -118,11 +118,7 @@ def test_walls_see_each_other_and_themselves_in_mirrors() -> None:
     )
     straight, found = (
         Interreflection(
-            scene,
-            lit,
-            width=len(PIXEL),
-            height=1,
-            exchange=Exchange.of(scene, 12, mirrors=mirrors),
+            scene, lit, width=len(PIXEL), height=1, exchange=Exchange.of(scene, 12, mirrors=mirrors)
         )
         for mirrors in (False, True)
     )

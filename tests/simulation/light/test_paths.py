@@ -12,13 +12,7 @@ from transientcam_driver.camera import Sensor
 from transientcam_simulation.base import Lens, SparseResponses
 from transientcam_simulation.emulated import find_scene
 from transientcam_simulation.light import _paths as paths
-from transientcam_simulation.light._paths import (
-    ImageLight,
-    Lit,
-    image_lights,
-    light_on,
-    light_rays,
-)
+from transientcam_simulation.light._paths import ImageLight, Lit, image_lights, light_on, light_rays
 from transientcam_simulation.light._rays import rays_through
 from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.scene import Light, Rectangle, Scene, Surface, Viewpoint
@@ -245,8 +239,7 @@ class TestMirrors:
     def test_each_digit_shadows_the_return_of_its_path(self) -> None:
         with_stencils = find_scene("mirrors")
         without = replace(
-            with_stencils,
-            surfaces=tuple(s for s in with_stencils.surfaces if s.kind != "stencil"),
+            with_stencils, surfaces=tuple(s for s in with_stencils.surfaces if s.kind != "stencil")
         )
         for path, (name, column) in enumerate((("1", 130), ("2", 80), ("3", 28))):
             alone = replace(

@@ -188,10 +188,7 @@ WALL = SCENE[SCENE.index("[[surface]]") :]
         (SCENE.replace("1e7", "9" * 400), "light.electrons_per_s"),
         (SCENE.replace("[3, 2]", f"[3, {'9' * 400}]"), "surface[0].size_m"),
         ('name = "mirrors"\n' + SCENE, "name"),
-        (
-            '[light]\nelectrons_per_s = 1e7\n[[response]]\nfile = "/etc/passwd"',
-            "response[0].file",
-        ),
+        ('[light]\nelectrons_per_s = 1e7\n[[response]]\nfile = "/etc/passwd"', "response[0].file"),
         (SCENE + '[device]\nwaveform_file = "/dev/zero"', "device.waveform_file"),
         (SCENE + '[device.pattern]\nfile = "/dev/zero"', "device.pattern.file"),
         (SCENE + 32 * WALL, "surface"),

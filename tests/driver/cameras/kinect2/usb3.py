@@ -11,14 +11,7 @@ import threading
 from collections import deque
 from pathlib import Path
 
-from tests.driver.cameras.open_usb.usbfs.usbfs import (
-    Client,
-    Ioctl,
-    Model,
-    Refused,
-    Urb,
-    UsbfsMount,
-)
+from tests.driver.cameras.open_usb.usbfs.usbfs import Client, Ioctl, Model, Refused, Urb, UsbfsMount
 from transientcam_driver.errors import CameraError, CameraLost
 from transientcam_simulation.emulated._kinect2.device import EmulatedKinect2, EmulatedLink
 from transientcam_simulation.emulated._open_usb.descriptors import string_descriptors

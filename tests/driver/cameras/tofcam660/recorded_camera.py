@@ -6,12 +6,7 @@ from collections import defaultdict, deque
 from pathlib import Path
 
 from tests.driver.cameras.tofcam660.session import frames, steps
-from transientcam_driver.cameras.tofcam660 import (
-    AnswerType,
-    Command,
-    pack_answer,
-    payload_bytes,
-)
+from transientcam_driver.cameras.tofcam660 import AnswerType, Command, pack_answer, payload_bytes
 from transientcam_driver.cameras.tofcam660._wire import pack_request
 
 NEVER_RECORDED = {Command.STOP_STREAM}

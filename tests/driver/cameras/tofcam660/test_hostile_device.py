@@ -147,9 +147,7 @@ Udp = tuple[UdpImages, Callable[..., None]]
 
 
 @pytest.mark.parametrize(
-    "order",
-    [(0, 1, 2, 3), (3, 1, 0, 2), (0, 0, 1, 1, 2, 3)],
-    ids=["in-order", "mixed", "doubled"],
+    "order", [(0, 1, 2, 3), (3, 1, 0, 2), (0, 0, 1, 1, 2, 3)], ids=["in-order", "mixed", "doubled"]
 )
 def test_packets_make_an_image_in_any_order(udp: Udp, order: tuple[int, ...]) -> None:
     images, deliver = udp

@@ -113,8 +113,7 @@ def test_corrupt_pixels_have_the_highest_code_and_others_keep_theirs() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"kind": 1}, {"columns": 79}, {"rows": 0}, {"integration_us": (299, 0, 0)}],
+    "wrong", [{"kind": 1}, {"columns": 79}, {"rows": 0}, {"integration_us": (299, 0, 0)}]
 )
 def test_images_that_were_not_asked_for_are_lost(wrong: dict[str, int]) -> None:
     header = replace(ImageHeader(4, 80, 60, ROI, (300, 0, 0), 41.25), **wrong)  # type: ignore[arg-type]

@@ -93,11 +93,7 @@ def test_the_own_page_may_open_the_stream(steady_daemon: Served) -> None:
 
 def test_a_page_of_another_site_may_link_here_but_load_nothing(steady: httpx.Client) -> None:
     def status(site: str, mode: str, destination: str) -> int:
-        headers = {
-            "Sec-Fetch-Site": site,
-            "Sec-Fetch-Mode": mode,
-            "Sec-Fetch-Dest": destination,
-        }
+        headers = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": mode, "Sec-Fetch-Dest": destination}
         return steady.get("/api/v1/frames/latest/flags.png", headers=headers).status_code
 
     assert status("cross-site", "no-cors", "image") == 403

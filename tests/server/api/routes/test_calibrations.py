@@ -242,10 +242,7 @@ def test_a_disk_that_takes_nothing_is_a_problem_and_no_more(tmp_path: Path) -> N
 
 def test_a_file_beyond_the_limit_is_refused(tmp_path: Path) -> None:
     limits = {"directory": tmp_path, "max_bytes": 2048}
-    with (
-        serving("sim:calibration", calibrations=limits) as daemon,
-        client_of(daemon) as http,
-    ):
+    with serving("sim:calibration", calibrations=limits) as daemon, client_of(daemon) as http:
         answer = http.post(f"{CALIBRATIONS}/import", content=b"\x00" * 4096)
 
     assert answer.status_code == 413

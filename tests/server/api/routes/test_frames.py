@@ -376,9 +376,7 @@ def test_returns_are_those_of_the_pixel_the_strongest_first(still: httpx.Client)
     assert (weight[count:] == 0.0).all()
 
 
-def test_a_pointcloud_is_as_far_away_as_the_range_and_says_whose_rays(
-    still: httpx.Client,
-) -> None:
+def test_a_pointcloud_is_as_far_away_as_the_range_and_says_whose_rays(still: httpx.Client) -> None:
     cloud = product(still, "pointcloud")
     range_m = product(still, "range").array
 

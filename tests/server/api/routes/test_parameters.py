@@ -141,10 +141,7 @@ def test_estimators_and_harmonics_that_do_not_go_together_are_not_allowed(
 
 def test_a_recording_has_a_sequence_that_can_only_be_read(tmp_path: Path) -> None:
     kept = {"directory": tmp_path, "min_free_bytes": 0}
-    with (
-        serving(recordings=kept) as daemon,
-        httpx.Client(base_url=daemon.url, timeout=60) as http,
-    ):
+    with serving(recordings=kept) as daemon, httpx.Client(base_url=daemon.url, timeout=60) as http:
         identity = http.post("/api/v1/recordings", json={"frames": 2}).json()["id"]
         wait_until(lambda: http.get(f"/api/v1/recordings/{identity}").json()["state"] == "complete")
 

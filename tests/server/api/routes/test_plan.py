@@ -323,9 +323,7 @@ def test_a_viewer_has_new_frames_while_something_is_planned(
     assert numbers == sorted(set(numbers))
 
 
-def test_errors_of_the_range_cost_nothing_until_a_client_requests_them(
-    noisy: httpx.Client,
-) -> None:
+def test_errors_of_the_range_cost_nothing_until_a_client_requests_them(noisy: httpx.Client) -> None:
     noisy.put("/api/v1/acquisition", json={"running": False})
     try:
         before, asked, after = (

@@ -254,13 +254,7 @@ def test_a_file_can_be_downloaded_whole_and_in_parts(http: httpx.Client, directo
     assert http.get(url, headers=newer).content == data
 
 
-@pytest.mark.parametrize(
-    ("wanted", "status"),
-    [
-        ("bytes=99999999999-", 416),
-        ("bytes=-0", 416),
-    ],
-)
+@pytest.mark.parametrize(("wanted", "status"), [("bytes=99999999999-", 416), ("bytes=-0", 416)])
 def test_a_range_that_cannot_be_served_is_a_problem(
     http: httpx.Client, directory: Path, wanted: str, status: int
 ) -> None:
@@ -494,10 +488,7 @@ def test_a_read_only_directory_is_a_problem(http: httpx.Client, directory: Path)
 def test_what_was_left_unfinished_is_recovered_at_the_start(directory: Path) -> None:
     directory.mkdir()
     part = abandoned(directory / "left.h5", 4)
-    with (
-        serving(recordings={"directory": directory}) as served,
-        client_of(served) as http,
-    ):
+    with serving(recordings={"directory": directory}) as served, client_of(served) as http:
         document = finished(http, "left", unfinished="interrupted")
 
     assert document["state"] == "complete"
@@ -528,10 +519,7 @@ def test_the_end_of_the_service_finishes_the_recording(directory: Path) -> None:
 def test_streams_are_notified_of_recordings(daemon: Served, http: httpx.Client) -> None:
     import transientcam
 
-    with (
-        transientcam.Camera(daemon.url) as camera,
-        camera.stream("range") as stream,
-    ):
+    with transientcam.Camera(daemon.url) as camera, camera.stream("range") as stream:
         stream.receive()
         recording = recorded(http, frames=2)["id"]
         reported: list[wire.Notice] = []
@@ -551,10 +539,7 @@ def test_a_recording_served_as_a_camera_gives_the_same_images_and_refuses_anothe
 ) -> None:
     recording = recorded(http)["id"]
     path = directory / f"{recording}.h5"
-    with (
-        serving(f"recording:{path}?loop=on") as replayed,
-        client_of(replayed) as again,
-    ):
+    with serving(f"recording:{path}?loop=on") as replayed, client_of(replayed) as again:
         frame = wire.parse_frame(
             again.get("/api/v1/frames/latest/raw.msgpack", params={"wait_s": 10}).content
         )

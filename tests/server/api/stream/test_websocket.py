@@ -70,10 +70,7 @@ def test_a_rate_limit_thins_one_channel_and_leaves_the_other(served: Served) -> 
             {
                 "type": "subscribe",
                 "v": 1,
-                "subscriptions": [
-                    {"product": "flags"},
-                    {"product": "range", "max_rate_hz": 2.0},
-                ],
+                "subscriptions": [{"product": "flags"}, {"product": "range", "max_rate_hz": 2.0}],
             }
         )
         times_s: dict[str, list[float]] = {"flags": [], "range": []}
@@ -349,10 +346,7 @@ def test_frames_come_at_the_rate_of_the_camera_and_every_missing_one_is_reported
 def test_a_handshake_without_the_subprotocol_is_refused_with_a_problem(
     served: Served, offered: Any
 ) -> None:
-    with (
-        pytest.raises(InvalidStatus) as caught,
-        streaming(served.stream_url, subprotocols=offered),
-    ):
+    with pytest.raises(InvalidStatus) as caught, streaming(served.stream_url, subprotocols=offered):
         pass
 
     response = caught.value.response

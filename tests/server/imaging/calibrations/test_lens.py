@@ -9,12 +9,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver import Lens
 from transientcam_server.errors import InputError
-from transientcam_server.imaging import (
-    Intrinsics,
-    beam_of_wall,
-    lens_of_walls,
-    second_in_first,
-)
+from transientcam_server.imaging import Intrinsics, beam_of_wall, lens_of_walls, second_in_first
 
 WIDTH, HEIGHT = 163, 120
 SIZE: dict[str, Any] = {"width": WIDTH, "height": HEIGHT}

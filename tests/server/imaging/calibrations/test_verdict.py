@@ -8,10 +8,7 @@ import pytest
 from transientcam_server.imaging import Verdict
 from transientcam_server.imaging._calibrations.verdict import Finding, word_of
 
-FINDINGS = (
-    Finding("unlike_share", 0.1, 0.05, "share"),
-    Finding("offset_m", math.nan, 0.1, "m"),
-)
+FINDINGS = (Finding("unlike_share", 0.1, 0.05, "share"), Finding("offset_m", math.nan, 0.1, "m"))
 VERDICT = Verdict("scene", FINDINGS, 8, (".#", "?."), "nominal")
 
 

@@ -54,10 +54,7 @@ def found(
 
 
 def trust_of(
-    recipe: Recipe,
-    image: tm.Reconstruction,
-    raw: RawFrame | None = None,
-    bias_m: float = 1e-4,
+    recipe: Recipe, image: tm.Reconstruction, raw: RawFrame | None = None, bias_m: float = 1e-4
 ) -> tuple[Array, Array]:
     std_m, off_m = np.full(SHAPE, 1e-3), np.full(SHAPE, bias_m)
     return judged(recipe, image, std_m, off_m, raw)
@@ -172,8 +169,7 @@ def test_half_of_what_a_tail_moves_the_highest_frequency_is_in_the_interval() ->
 
 
 KEEPING_EDGES = replace(
-    RECIPE,
-    settings=ReconstructionSettings(estimator="likelihood", neighbours="edge-preserving"),
+    RECIPE, settings=ReconstructionSettings(estimator="likelihood", neighbours="edge-preserving")
 )
 
 

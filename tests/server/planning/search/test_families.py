@@ -66,12 +66,7 @@ def test_an_estimator_that_is_asked_for_is_searched_alone(capabilities: Capabili
 
 @pytest.mark.parametrize(
     ("fixed", "values"),
-    [
-        ("harmonics", {5}),
-        ("base_frequency_hz", {20e6}),
-        ("takes", {7}),
-        ("exposure_s", {3e-3}),
-    ],
+    [("harmonics", {5}), ("base_frequency_hz", {20e6}), ("takes", {7}), ("exposure_s", {3e-3})],
 )
 def test_a_field_that_is_fixed_stays(
     fixed: str, values: set[Any], capabilities: Capabilities

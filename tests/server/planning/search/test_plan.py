@@ -23,12 +23,7 @@ class Doubtful(ClosedForm):
         self.scene = dataclasses.replace(self.scene, dim_share=dim_share, uncertainty_m=apart)
 
     def predict(
-        self,
-        estimator: str,
-        sequence: Sequence,
-        *,
-        closely: bool = False,
-        capture_s: float = 0.0,
+        self, estimator: str, sequence: Sequence, *, closely: bool = False, capture_s: float = 0.0
     ) -> Prediction:
         found = super().predict(estimator, sequence)
         return dataclasses.replace(found, most_bias_m=0.04, bias_known=False)

@@ -90,12 +90,7 @@ class Hasty(ClosedForm):
         return std_m, bias_m, part * error_m
 
     def predict(
-        self,
-        estimator: str,
-        sequence: Sequence,
-        *,
-        closely: bool = False,
-        capture_s: float = 0.0,
+        self, estimator: str, sequence: Sequence, *, closely: bool = False, capture_s: float = 0.0
     ) -> Prediction:
         exact = super().quick(estimator, sequence, self.noise_scale(sequence))
         std, error = (Figure(each, each, each, each, each) for each in (exact[0], exact[2]))
@@ -141,12 +136,7 @@ class Sampled(ClosedForm):
     """Few pixels leave an error uncertain by a third; all that there are do not."""
 
     def predict(
-        self,
-        estimator: str,
-        sequence: Sequence,
-        *,
-        closely: bool = False,
-        capture_s: float = 0.0,
+        self, estimator: str, sequence: Sequence, *, closely: bool = False, capture_s: float = 0.0
     ) -> Prediction:
         found = super().predict(estimator, sequence)
         if closely:

@@ -13,12 +13,7 @@ from transientcam_server.planning import Goal, Progress
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._search.families import families
 from transientcam_server.planning._search.search import curves
-from transientcam_server.planning._search.tradeoff import (
-    _coarse_to_fine,
-    _times_s,
-    fronts,
-    lines,
-)
+from transientcam_server.planning._search.tradeoff import _coarse_to_fine, _times_s, fronts, lines
 
 
 def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:

@@ -8,12 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver.camera import Sensor
-from transientcam_driver.cameras.kinect2 import (
-    P0Tables,
-    Request,
-    _commands as commands,
-    codes,
-)
+from transientcam_driver.cameras.kinect2 import P0Tables, Request, _commands as commands, codes
 from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import TransferStalled
@@ -60,9 +55,7 @@ def test_phases_are_those_of_the_path_and_of_the_tables_that_the_camera_reports(
         assert off_rad.std() < 0.02
 
 
-def test_noise_is_that_of_the_sensor_that_the_simulation_states(
-    two_frames: TwoFrames,
-) -> None:
+def test_noise_is_that_of_the_sensor_that_the_simulation_states(two_frames: TwoFrames) -> None:
     one, other, _, _, sensor = two_frames
     amplitude = np.abs(one[0] + one[1] * np.exp(2j * np.pi / 3) + one[2] * np.exp(4j * np.pi / 3))
     half_e = amplitude.mean() * 2 / 3 / 2 * sensor.gain_e_per_dn  # of b_0 = |b|

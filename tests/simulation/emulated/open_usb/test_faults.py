@@ -38,8 +38,7 @@ def test_a_fault_happens_to_the_next_packet(fault: Fault, expected: list[bytes |
 
 
 @pytest.mark.parametrize(
-    ("fault", "places"),
-    [(Fault.CORRUPT_HEADER, range(64)), (Fault.CORRUPT_PIXELS, range(64, 200))],
+    ("fault", "places"), [(Fault.CORRUPT_HEADER, range(64)), (Fault.CORRUPT_PIXELS, range(64, 200))]
 )
 def test_a_corrupt_packet_differs_in_one_place(fault: Fault, places: range) -> None:
     damaged, *others = transfers(fault)

@@ -31,10 +31,7 @@ from transientcam_driver.cameras.open_usb.protocol import (
     unpack_status,
     unpack_time,
 )
-from transientcam_driver.cameras.open_usb.protocol._capabilities import (
-    CAPS_BYTES,
-    CAPS_ROOM_BYTES,
-)
+from transientcam_driver.cameras.open_usb.protocol._capabilities import CAPS_BYTES, CAPS_ROOM_BYTES
 from transientcam_driver.cameras.open_usb.protocol._requests import (
     IMAGE_ENDPOINT,
     PRODUCT_ID,

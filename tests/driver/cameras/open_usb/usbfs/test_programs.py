@@ -64,9 +64,7 @@ def daemon(camera: EmulatedCamera) -> Iterator[tuple[str, "subprocess.Popen[str]
         process.stdout.close()
 
 
-def test_frames_travel_from_the_usb_endpoint_to_a_clients_array(
-    usb_camera: EmulatedCamera,
-) -> None:
+def test_frames_travel_from_the_usb_endpoint_to_a_clients_array(usb_camera: EmulatedCamera) -> None:
     with daemon(usb_camera) as (url, process), transientcam.Camera(url, timeout_s=60) as camera:
         camera.sequence = QUICK
         with camera.stream("raw", "range") as stream:
