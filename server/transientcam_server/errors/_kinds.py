@@ -2,7 +2,7 @@
 
 import tomllib
 from dataclasses import dataclass
-from importlib.resources import files
+from pathlib import Path
 from typing import Final
 
 
@@ -21,7 +21,7 @@ class ProblemKind:
         return f"/problems/{self.slug}"
 
 
-_TEXTS: Final = tomllib.loads(files(__package__).joinpath("kinds.toml").read_text(encoding="utf-8"))
+_TEXTS: Final = tomllib.loads(Path(__file__).with_name("kinds.toml").read_text("utf-8"))
 KINDS: Final = {slug: ProblemKind(slug=slug, **texts) for slug, texts in _TEXTS.items()}
 """Every kind by its slug."""
 

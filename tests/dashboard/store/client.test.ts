@@ -33,7 +33,14 @@ class Page {
     api: new Api(() =>
       Promise.resolve(
         new Response(
-          JSON.stringify({ ...CAMERA, absent_products: this.absent, estimators: [], products: this.products, active: null, recordings: [] }),
+          JSON.stringify({
+            ...CAMERA,
+            absent_products: this.absent,
+            estimators: [],
+            products: this.products,
+            active: null,
+            recordings: [],
+          }),
         ),
       ),
     ),
