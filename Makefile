@@ -37,8 +37,8 @@ serve: install  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirror
 # What waits for the network first, side by side; and then what computes.
 test:  ## Run every check and every test
 	@$(MAKE) --no-print-directory --jobs 3 .venv/test.stamp debian-packages client/dashboard/node_modules/.package-lock.json
-	@$(MAKE) --no-print-directory .venv/version.stamp
-	@$(MAKE) --no-print-directory --jobs 2 compiled-once $(CHECKS) dashboard
+	@$(MAKE) --no-print-directory .venv/version.stamp dashboard
+	@$(MAKE) --no-print-directory --jobs 2 compiled-once $(CHECKS)
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 # The packages that are arithmetic, without a daemon, a browser, a compiler or a fuzzer.
