@@ -89,7 +89,7 @@ def test_points_are_handed_out_where_the_lens_says(page: Page, served: Served) -
     expect(canvas).to_have_attribute("data-points", str(valid.sum()))
     lens = httpx.get(f"{served.url}/api/v1/camera").json()["intrinsics"]
     with page.expect_download() as download:
-        choose(page, "points", "Points as shown (CSV)")
+        choose(page, "points", "Points as streamed (CSV)")
     table = np.genfromtxt(Path(download.value.path()), delimiter=",", names=True)
     points = np.stack([table[f"{axis}_m"] for axis in "xyz"], axis=1)
     y, x = np.nonzero(valid)
