@@ -6,7 +6,7 @@ from typing import Final
 from transientcam_driver.camera._camera import Camera
 from transientcam_driver.camera._plugin import GROUP, CameraName, CameraPlugin
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.errors import DriverError, PluginError, SpecError
+from transientcam_driver.errors import PluginError, SpecError
 
 DEFAULT_SPEC: Final = "sim:mirrors"
 
@@ -37,9 +37,10 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
     name, plugin = plugin_of(spec)
     try:
         camera = plugin.open(name, clock or RealClock())
-    except DriverError:
-        raise
     except (Exception, SystemExit) as error:  # of a package that is not ours
+        # a package's own kinds, and the system's, are meant to be read
+        if isinstance(error, OSError) or type(error).__module__ != "builtins":
+            raise
         raise PluginError(name.kind, f"open() raised {error!r:.200}") from error
     if not hasattr(camera, "read_frame"):
         raise PluginError(name.kind, f"open() returned {camera!r:.60}, no Camera")
