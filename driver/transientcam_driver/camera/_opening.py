@@ -6,7 +6,7 @@ from typing import Final
 from transientcam_driver.camera._camera import Camera
 from transientcam_driver.camera._plugin import GROUP, CameraName, CameraPlugin
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.errors import PluginError, SpecError
+from transientcam_driver.errors import DriverError, PluginError, SpecError
 
 DEFAULT_SPEC: Final = "sim:mirrors"
 
@@ -39,7 +39,8 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
         camera = plugin.open(name, clock or RealClock())
     except (Exception, SystemExit) as error:  # of a package that is not ours
         # a package's own kinds, and the system's, are meant to be read
-        if isinstance(error, OSError) or type(error).__module__ != "builtins":
+        own = _package(type(error)) == _package(plugin.open)
+        if own or isinstance(error, OSError | DriverError):
             raise
         raise PluginError(name.kind, f"open() raised {error!r:.200}") from error
     if not hasattr(camera, "read_frame"):
@@ -54,6 +55,10 @@ def check_camera(spec: str) -> None:
     """
     name, plugin = plugin_of(spec)
     plugin.check(name)
+
+
+def _package(of: object) -> str:
+    return str(getattr(of, "__module__", "")).partition(".")[0]
 
 
 def kinds() -> tuple[str, ...]:

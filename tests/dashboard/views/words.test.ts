@@ -49,7 +49,7 @@ describe("a frame with too much or too little light", () => {
 
   test("is named where no exposure mends it, and one with enough light is not", () => {
     expect(exposureAdvice(frame(100, 0, 2e-5), CAMERA)).toMatchObject({ word: "Saturated", exposure_s: null });
-    for (const meta of [frame(9, 0), frame(0, 24), { exposure_s: 1, pixels: null } as FrameMeta, null])
+    for (const meta of [frame(9, 0), frame(0, 49), { exposure_s: 1, pixels: null } as FrameMeta, null])
       expect(exposureAdvice(meta, CAMERA)).toBeNull();
   });
 });

@@ -1,3 +1,4 @@
+import json
 import sys
 from functools import partial
 from importlib.metadata import EntryPoint
@@ -231,6 +232,7 @@ def test_a_plug_in_that_cannot_be_used_says_why(
     ("opens", "reason"),
     [
         (lambda name, clock: name.options["lut"], r"open\(\) raised KeyError\('lut'\)"),
+        (lambda name, clock: json.loads("{"), r"open\(\) raised JSONDecodeError\("),
         (lambda name, clock: sys.exit(5), r"open\(\) raised SystemExit\(5\)"),
         (lambda name, clock: None, r"open\(\) returned None, no Camera"),
     ],

@@ -43,7 +43,8 @@ class SecurityHeaders:
 
     def __init__(self, app: ASGIApp, *, framed_by: tuple[str, ...] = ()) -> None:
         self._app = app
-        policy = " ".join((SECURITY_HEADERS["Content-Security-Policy"], *framed_by))
+        origins = (each.rstrip("/") for each in framed_by)
+        policy = " ".join((SECURITY_HEADERS["Content-Security-Policy"], *origins))
         self._headers = SECURITY_HEADERS | {"Content-Security-Policy": policy}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -111,7 +111,7 @@ def test_pages_of_allowed_origins_may_hold_the_page_in_a_frame() -> None:
         async with httpx.AsyncClient(transport=app, base_url="http://localhost:8000") as client:
             return await client.get("/", headers={"Sec-Fetch-Site": "cross-site", **frame})
 
-    allowed, refused = asyncio.run(answer("http://wall.example")), asyncio.run(answer())
+    allowed, refused = asyncio.run(answer("http://wall.example/")), asyncio.run(answer())
 
     assert (allowed.status_code, refused.status_code) == (200, 403)
     policies = [each.headers["content-security-policy"] for each in (allowed, refused)]

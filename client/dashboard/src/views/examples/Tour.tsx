@@ -20,8 +20,8 @@ const STEPS: readonly (readonly [place: string, words: string])[] = [
   ],
   [
     "response",
-    "The light of one pixel over time; click another pixel to see its own. Each peak is a return. The band holds every curve that agrees " +
-      "with the measurement, so a narrow band is a sure one.",
+    "The light of one pixel over time; click another pixel to see its own. Each peak is a return. The band holds every smoothed curve " +
+      "that has the measured moments; what noise adds stands in the table.",
   ],
   ["sequence", "What accuracy costs: Predict weighs other sequences for this scene, then the slider chooses between fast and accurate."],
   [

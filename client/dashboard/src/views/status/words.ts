@@ -16,7 +16,7 @@ export function tokenWords({ token, refused }: Credentials): string {
 }
 
 /** Least share of saturated and of dark pixels that something is done about, and from where on much. */
-const [SATURATED, DARK, MOST] = [0.1, 0.25, 0.8];
+const [SATURATED, DARK, MOST] = [0.1, 0.5, 0.8];
 
 /** What to do about a frame with too much or too little light: the exposure to try, null where the camera has none; null where there is enough. */
 export function exposureAdvice(
