@@ -17,8 +17,10 @@ export default defineConfig({
     // A data: URL would need its own line in the Content-Security-Policy.
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
-    // What the views share comes first, in one file, as rules of a component come after the base's; a drawing when it is saved.
-    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", test: /src.(base|s\w+|ui.(?!drawing))|preact|uplot/ }] } } },
+    // What the views share comes first, in one file, as rules of a component come after the base's; a drawing or a film when it is saved.
+    rolldownOptions: {
+      output: { codeSplitting: { groups: [{ name: "page", test: /src.(base|s\w+|ui.(?!drawing|film))|preact|uplot/ }] } },
+    },
     // three, which is loaded when points in space are first shown
     chunkSizeWarningLimit: 800,
   },

@@ -6,18 +6,18 @@ import { type DialogName, useStore } from "./store/store";
 import { Dialog, type Done } from "./ui/Dialog";
 import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
-import { CameraDialog } from "./views/camera/CameraDialog";
 import { FileDrop } from "./views/files/FileDrop";
 import { later } from "./views/later";
 import { Palette } from "./views/palette/Palette";
 import { ReplayBar } from "./views/replay/ReplayBar";
 import { Banner } from "./views/status/Banner";
-import { ControlDialog } from "./views/status/ControlDialog";
 import { LayoutDialog } from "./views/status/LayoutDialog";
 import { StatusBar } from "./views/status/StatusBar";
 import { TokenDialog } from "./views/status/TokenDialog";
 
 const Examples = later(() => import("./views/examples/Examples"));
+const CameraDialog = later<Done>(() => import("./views/camera/CameraDialog"));
+const ControlDialog = later<Done>(() => import("./views/status/ControlDialog"));
 const Help = later<Done>(() => import("./views/palette/Help"));
 const Tour = later<Done>(() => import("./views/examples/Tour"));
 

@@ -4,7 +4,7 @@ import type { Action } from "../../ui/ActionMenu";
 import { Button } from "../../ui/controls";
 import { save } from "../../ui/download";
 import type { FilmKind, Progress } from "../../ui/film";
-import { filmPass, type Subject } from "./film";
+import type { Subject } from "./film";
 
 /** The film that is being made, if one is. */
 export class Filming implements Progress {
@@ -28,7 +28,7 @@ export class Filming implements Progress {
   actions(subject: Subject, store: Store): Action[] {
     const run = (kind: FilmKind) => (): void => {
       const name = `pass-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`;
-      void this.#make(store, () => filmPass(subject, store, kind, this), name);
+      void this.#make(store, async () => (await import("./film")).filmPass(subject, store, kind, this), name);
     };
     return [
       { text: "Film of one pass (WebM)", run: run("webm") },
