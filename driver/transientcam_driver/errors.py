@@ -162,11 +162,11 @@ class CameraNotFound(CameraError, StatedError):
     """No camera of this kind, or none with this serial number, is plugged in."""
 
     serial: str | None = None
+    reason: str = ""  # in words of its own
 
     def __str__(self) -> str:
-        if self.serial is None:
-            return "no camera is plugged in"
-        return f"no camera with serial number {self.serial!r} is plugged in"
+        named = "" if self.serial is None else f" with serial number {self.serial!r}"
+        return self.reason or f"no camera{named} is plugged in"
 
 
 class CameraUnreachable(CameraNotFound):

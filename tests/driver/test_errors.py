@@ -15,6 +15,7 @@ EXAMPLES: list[DriverError] = [
     errors.CalibrationFileError("a.npz", "images", "absent", "float32"),
     errors.CameraNotFound(),
     errors.CameraNotFound("A-1"),
+    errors.CameraNotFound("A-1", "it has no ToF sensor"),
     errors.CameraUnreachable("10.10.31.180:50660"),
     errors.ImagesLost("12 bytes are missing"),
     errors.PluginError("lidar", "it is not installed"),

@@ -108,7 +108,7 @@ def test_a_daemon_serves_its_range(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_is_no_tof_camera_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(CameraNotFound, match="ABC"):
+    with pytest.raises(CameraNotFound, match="no OAK ABC can be opened: "):
         opened("oak:ABC")
     monkeypatch.setattr(mocked.Device, "sensors", ())
     with pytest.raises(CameraNotFound, match="no ToF sensor"):

@@ -62,11 +62,13 @@ class Oak:
         try:
             self._device = depthai.Device(name) if name else depthai.Device()
         except RuntimeError as error:
-            raise CameraNotFound(name or f"OAK ({error})") from error
+            which = f"OAK {name}".strip()
+            raise CameraNotFound(name, f"no {which} can be opened: {error}") from error
         try:
             sensors = self._device.getConnectedCameras(depthai.CameraSensorType.TOF)
             if not sensors:
-                raise CameraNotFound(f"{self._device.getDeviceId()} has no ToF sensor")
+                serial = self._device.getDeviceId()
+                raise CameraNotFound(serial, f"the device {serial} has no ToF sensor")
             self._socket = sensors[0]
             self.description = Description(
                 model=f"{self._device.getProductName() or 'OAK'} ToF",
