@@ -172,7 +172,7 @@ class Acquisition:
         if self._darkness is not None:
             self._darkness.keep(self._dark)
         off = self._off_switch.begin()
-        self.submit(self._safe_off)
+        self.submit(lambda: self._go_dark(Dark("safe-off")))
         return off
 
     @property
@@ -304,7 +304,6 @@ class Acquisition:
         """Stay dark until somebody starts, where the supervisor has switched off or is gone."""
         if reason is not None:
             self._offs += 1
-            self._started = False
             self._go_dark(Dark("supervisor", reason))
 
     def _step(self) -> None:
@@ -315,6 +314,7 @@ class Acquisition:
             self._configure(self._restored)
             self._restored = None
         elif not self._running:
+            self._end_light()  # again where that has failed
             self._run_commands(wait_s=IDLE_S)
             self._camera.status()  # detects an unplug while nothing is read
             self._camera_works()
@@ -363,12 +363,14 @@ class Acquisition:
             self._offs += 1
             self._stop("lapse")
 
-    def _end_light(self) -> None:
-        """Switch the light off; the next one is announced anew."""
+    def _end_light(self, *, safe: bool = False) -> None:
+        """Switch the light off, and again where that failed; the next one is announced anew."""
         self._announcement.withdraw()
+        self._started |= safe
         if self._started:
+            # `safe`: no request comes before the one that no state refuses
+            (self._camera.safe_off if safe else self._camera.stop)()
             self._started = False
-            self._camera.stop()
 
     def _read(self) -> None:
         if self._is_missed():
@@ -452,9 +454,7 @@ class Acquisition:
         self._arrivals_s.clear()
         self._moved_s = self._clock()
         try:
-            self._end_light()
-            if dark.cause in ("safe-off", "supervisor"):
-                self._camera.safe_off()
+            self._end_light(safe=dark.cause in ("safe-off", "supervisor"))
         finally:
             _log.warning("%s", dark)
             if self._darkness is not None:
@@ -500,10 +500,11 @@ class Acquisition:
                 go_on()
             self._arrivals_s.clear()
             if self._started:
-                self._started = False
                 self._camera.stop()
+                self._started = False
             return work(self._camera, go_on)
         except CameraError as error:
+            self._started = True  # as far as anybody knows
             if self._offs == offs:
                 raise
             raise JobCancelled(job_id) from error  # the off switch was faster than this thread
@@ -519,10 +520,6 @@ class Acquisition:
             elif applied.epoch != before.epoch:
                 self._remember(applied)
                 self._report(SequenceChanged(applied))
-
-    def _safe_off(self) -> None:
-        self._started = False  # no request comes before the one that no state refuses
-        self._go_dark(Dark("safe-off"))
 
     def _camera_lost(self, reason: str) -> None:
         self._connected = False
@@ -542,6 +539,7 @@ class Acquisition:
             return
         self._attempts += 1
         self._camera.reconnect()
+        self._end_light()  # where that has failed when it was lost
         self._connected = True
         self._moved_s = self._clock()
         self._report_sequence()  # the same, but the device counts it anew

@@ -120,7 +120,7 @@ class SharedAcquisition(Acquisition):
     def _is_missed(self) -> bool:
         return False  # not by this service
 
-    def _end_light(self) -> None:
+    def _end_light(self, *, safe: bool = False) -> None:
         """Leave the light to the origin: only what clients ask for goes there."""
         self._started = False
 

@@ -24,6 +24,7 @@ from transientcam_driver import (
     Sequence,
     SequenceError,
 )
+from transientcam_driver.errors import TransferStalled
 from transientcam_server.camera import (
     Acquisition,
     CameraLostEvent,
@@ -176,6 +177,42 @@ def test_a_change_of_a_sequence_that_was_changed_meanwhile_is_refused() -> None:
             configure(Sequence(harmonics=5), expected=APPLIED.epoch).result(PATIENCE_S)
 
         assert late.value.running == first == one.camera.applied
+
+
+@pytest.mark.parametrize("command", ["safe_off", "stop"])
+@pytest.mark.parametrize("stalled", range(7))
+def test_a_request_to_switch_off_that_failed_is_sent_again_until_it_is_obeyed(
+    monkeypatch: pytest.MonkeyPatch, stalled: int, command: str
+) -> None:
+    with running() as one:
+        one.camera.deliver(1)
+        one.event()
+        left, obeyed = [stalled], threading.Event()
+
+        def stalling(name: str) -> Callable[[], Any]:
+            obey = getattr(one.camera, name)
+
+            def request() -> Any:
+                if left[0]:
+                    left[0] -= 1
+                    raise TransferStalled
+                answer = obey()
+                if name != "status":
+                    obeyed.set()
+                return answer
+
+            return request
+
+        for name in ("stop", "safe_off", "status"):
+            monkeypatch.setattr(one.camera, name, stalling(name))
+        if command == "safe_off":
+            one.acquisition.safe_off()
+        else:
+            one.acquisition.set_running(False)
+
+        assert obeyed.wait(PATIENCE_S)
+        assert not one.lit
+        monkeypatch.undo()
 
 
 def test_a_refused_command_raises_in_its_caller_and_changes_nothing() -> None:

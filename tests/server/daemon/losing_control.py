@@ -367,20 +367,24 @@ class Relays:
 
         That is beyond what the networks take; of silent ones from when they speak.
         """
-        self._control.light()
         silent = delay_s == math.inf
-        for each in self._links:
-            each.delay_s = 0.0 if silent else delay_s
-            if silent:
-                each.silence()
-        begin_s = time.monotonic()
-        where = f"{self._relays[hop - 1].url}/api/v1/acquisition/safe-off"
-        httpx.post(where, headers={"Prefer": "wait=0"}, timeout=PATIENCE_S)
-        if silent:
-            wait_until(lambda: self._control.camera.lit)  # of some cameras now and then
-            begin_s = time.monotonic()
+        lit = False
+        while not lit:
+            self._control.light()
             for each in self._links:
-                each.speak()
+                each.delay_s = 0.0 if silent else delay_s
+                if silent:
+                    each.silence()
+            begin_s = time.monotonic()
+            where = f"{self._relays[hop - 1].url}/api/v1/acquisition/safe-off"
+            httpx.post(where, headers={"Prefer": "wait=0"}, timeout=PATIENCE_S)
+            lit = not silent or self._is_lit()
+            if silent:
+                begin_s = time.monotonic()
+                for each in self._links:
+                    each.speak()
+            if not lit:
+                wait_until(self._settled)
         took_s = self._control.goes_off(begin_s) - (0.0 if silent else hop * delay_s)
         off_s = self._control.off_s
         for each in self._links:
@@ -388,6 +392,17 @@ class Relays:
         wait_until(self._settled)
         self._control.goes_off(off_s)
         return self._control.off_s == off_s and self._control.state()[0] == "stopped", took_s
+
+    def _is_lit(self) -> bool:
+        """Wait for light, of some cameras now and then, or for a laden machine to put it out."""
+        seen = []
+
+        def look() -> bool:
+            seen[:] = [self._control.camera.lit]
+            return seen[0] or self._control.state()[0] == "stopped"
+
+        wait_until(look)
+        return seen[0]
 
     def _settled(self) -> bool:
         """Return whether every relay knows that it is off, and no request is on its way."""
