@@ -395,14 +395,15 @@ class Relays:
 
     def _is_lit(self) -> bool:
         """Wait for light, of some cameras now and then, or for a laden machine to put it out."""
-        seen = []
+        lit = False
 
         def look() -> bool:
-            seen[:] = [self._control.camera.lit]
-            return seen[0] or self._control.state()[0] == "stopped"
+            nonlocal lit
+            lit = self._control.camera.lit
+            return lit or self._control.state()[0] == "stopped"
 
         wait_until(look)
-        return seen[0]
+        return lit
 
     def _settled(self) -> bool:
         """Return whether every relay knows that it is off, and no request is on its way."""
