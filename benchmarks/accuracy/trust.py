@@ -71,9 +71,9 @@ def _tables(neighbours: str, names: list[str], found: list[Judged], others: int)
             "A pixel is wrong where it is off the surface that it sees by more than "
             f"{_WRONG:g} times its `range_error`, right within its interval. Bars: 80 % of the "
             "wrong ones marked, 5 % of the right ones, 85 to 95 % in their interval, whose median "
-            "is at most 3 times the median error. Mirrors are left out. Light from elsewhere leaves "
-            "wide intervals that hold though no surface was measured: the last column is of right "
-            "pixels with more than half of their light from the lamp itself."
+            "is at most 3 times the median error. Mirrors are left out. Light from elsewhere "
+            "leaves wide intervals, which hold though no surface was measured: the last column is "
+            "of right pixels with more than half of their light from the lamp itself."
         ],
     )
     table.rows.extend((name, *_figures(of)) for name, of in zip(names, found, strict=True))

@@ -80,6 +80,7 @@ def judged(
         times = 1.0
         # m - 1 harmonics are off by their noise beyond that of m; squares add up to information
         joined *= (m + 1) * (2 * m + 1) / (max(m - 1, 1) * (2 * m - 1)) - 1.0
+        bias_m = bias_m * (np.asarray(found.likelihood.count) < m)  # m - 1 have no m returns at all
         with np.errstate(all="ignore"):
             tail = np.clip(np.asarray(found.likelihood.tail) / brightness_dn, 0.0, 1.0)
     then_c = None if recipe.gains is None else recipe.gains.temperature_c

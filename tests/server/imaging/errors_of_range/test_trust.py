@@ -212,6 +212,25 @@ def test_what_tells_of_the_same_later_light_counts_once() -> None:
     np.testing.assert_allclose(error_m, np.hypot(20e-3, 1.5e-3), rtol=0.01)
 
 
+def test_fewer_harmonics_than_returns_show_no_bias_of_all_of_them() -> None:
+    """Two harmonics hold two returns, and are off by centimetres where three are."""
+    applied = replace(APPLIED, sequence=replace(APPLIED.sequence, harmonics=3))
+    recipe = replace(KEEPING_EDGES, applied=applied)
+    j = np.arange(4).reshape(-1, 1, 1)
+
+    def error_m(shares: tuple[float, ...]) -> Array:
+        b = sum(
+            share * np.exp(1j * j * METRES * np.full(SHAPE, 1.0 + 2.0 * after))
+            for after, share in enumerate(shares)
+        )
+        image = recipe._reconstructor(tm.Measured((500.0 * b).astype(np.complex64)))
+        assert (np.asarray(image.likelihood.count) == len(shares)).all()
+        return trust_of(recipe, image, bias_m=50e-3)[0]
+
+    assert (error_m((0.7, 0.3)) > 49e-3).all()
+    assert (error_m((0.5, 0.3, 0.2)) < 10e-3).all()
+
+
 def capture(temperature_c: float) -> RawFrame:
     images = np.zeros((0, *SHAPE), np.uint16)
     return RawFrame(1, 1, images, APPLIED.sequence.labels, 0.0, 0.0, 0.1, temperature_c, 0)
