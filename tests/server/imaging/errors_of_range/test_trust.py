@@ -219,10 +219,11 @@ def test_fewer_harmonics_than_returns_show_no_bias_of_all_of_them() -> None:
     j = np.arange(4).reshape(-1, 1, 1)
 
     def error_m(shares: tuple[float, ...]) -> Array:
-        b = sum(
+        returns = [
             share * np.exp(1j * j * METRES * np.full(SHAPE, 1.0 + 2.0 * after))
             for after, share in enumerate(shares)
-        )
+        ]
+        b = np.sum(returns, axis=0)
         image = recipe._reconstructor(tm.Measured((500.0 * b).astype(np.complex64)))
         assert (np.asarray(image.likelihood.count) == len(shares)).all()
         return trust_of(recipe, image, bias_m=50e-3)[0]
