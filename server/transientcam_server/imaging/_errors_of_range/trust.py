@@ -27,11 +27,12 @@ _Array = NDArray[Any]
 NOISE: Final = 1.5
 """Half width of an interval by noise, in standard deviations; 1.645 hold 90 % of a normal variable,
 and a deviation by draws around what is noisy already is more than it."""
-TAIL_SHAPE: Final = 0.5
+TAIL_SHAPE: Final = 0.4
 """Times the share of a pixel's light that its tail has, of a radian at the highest frequency, by
 which the range is off since no tail has quite the shape of the model's."""
 BIAS: Final = 1.6
-"""Times the estimators' disagreement that later light moves a range."""
+"""Times another estimator's disagreement with the likelihood, which later light moves, too; fewer
+harmonics are off by more than all of them, so that their disagreement counts as it is."""
 LEAST_BIAS: Final = 0.02
 """Of the range of a radian at the highest frequency, by which later light may move a range that
 nothing shows."""
@@ -69,27 +70,30 @@ def judged(
     range_m = np.where(found.has_range, found.range_m, np.nan).astype(np.float64)
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
-    length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
-    noise_m, tail = std_m, np.zeros_like(range_m)
-    if recipe.technique == "likelihood":  # which knows how far other models are from its range
-        noise_m = np.fmax(std_m, found.range_std_m)
-        with np.errstate(all="ignore"):
-            tail = np.clip(np.asarray(found.likelihood.tail) / brightness_dn, 0.0, 1.0)
+    m = sequence.multiples[-1]
+    length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * m))
     # what of the disagreement is noise: it is a median over pixels, which averaging has joined
     joined = np.maximum(_averaged_pixels(found) / every_px**2, 1.0)
     joined = np.minimum(np.pi / 2 * joined / NEIGHBOURS_PX**2, 1.0)
+    tail, times = np.zeros_like(range_m), BIAS
+    if recipe.technique == "likelihood":
+        times = 1.0
+        # m - 1 harmonics are off by their noise beyond that of m; squares add up to information
+        joined *= (m + 1) * (2 * m + 1) / (max(m - 1, 1) * (2 * m - 1)) - 1.0
+        bias_m = bias_m * (np.asarray(found.likelihood.count) < m)  # m - 1 have no m returns at all
+        with np.errstate(all="ignore"):
+            tail = np.clip(np.asarray(found.likelihood.tail) / brightness_dn, 0.0, 1.0)
     then_c = None if recipe.gains is None else recipe.gains.temperature_c
     drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
     drift_m = 0.0 if drift is None else drift.range_m
-    parts_m = (
-        NOISE * std_m,
+    # each tells of the same later light, as far as it can: the most counts, not their sum
+    later_m = np.maximum.reduce([
         TAIL_SHAPE * tail * length_m,
-        BIAS * np.sqrt(np.maximum(bias_m**2 - joined * noise_m**2, 0.0)),
-        LEAST_BIAS * length_m,
+        times * np.sqrt(np.maximum(bias_m**2 - joined * std_m**2, 0.0)),
+        np.full_like(range_m, LEAST_BIAS * length_m),
         _spread_m(recipe, found, range_m),
-        drift_m,
-    )
-    error_m = np.sqrt(sum(np.square(part) for part in parts_m))
+    ])  # fmt: skip
+    error_m = np.sqrt((NOISE * std_m) ** 2 + later_m**2 + drift_m**2)
     edge, stray = edges_and_strays(range_m, std_m, brightness_dn)
     flags = np.asarray(found.flags)
     # one frequency knows nothing of later light
