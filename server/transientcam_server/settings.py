@@ -141,7 +141,7 @@ class SequenceSettings(_Group):
 class ReconstructionSettings(_Group):
     """How images become moments and moments become returns."""
 
-    neighbours: Neighbours = "gaussian"
+    neighbours: Neighbours = "edge-preserving"
     """How moments are averaged over neighbouring pixels. `edge-preserving` averages up to 69 that
     differ by no more than noise, and none across an edge: the noise falls two to four times further
     than by `gaussian`, which is the paper's, and stands in where the noise is not known, as of

@@ -86,7 +86,7 @@ class Settings:
     keep : {"harmonics", "brightness"}
         What biasing leaves as it is.
     neighbours : {"edge-preserving", "gaussian", "none"}
-        How moments are averaged over neighbouring pixels: "edge-preserving" is
+        How moments are averaged over neighbouring pixels: "edge-preserving", the default, is
         `average_neighbours`, and the Gaussian where the noise is neither stated nor told by images;
         those of a reconstruction say which was applied. "gaussian" is the paper's (Sec. 6). There
         is none without two image axes.
@@ -131,7 +131,7 @@ class Settings:
     phases_rad: tuple[float, ...] | None = None
     epsilon: float = EPSILON
     keep: str = "harmonics"
-    neighbours: str = "gaussian"
+    neighbours: str = "edge-preserving"
     smoothing_sigma_px: float = SIGMA_PX
     threshold: float = DIRECT_THRESHOLD
     estimator: str = "automatic"

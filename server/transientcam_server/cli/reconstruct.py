@@ -70,7 +70,7 @@ def reconstruct(
     neighbours: Annotated[
         Neighbours | None,
         typer.Option(
-            help="How pixels are averaged.  [default: gaussian; of a recording, as recorded]"
+            help="How pixels are averaged.  [default: --smoothing-px; of a recording, as recorded]"
         ),
     ] = None,
     smoothing_px: Annotated[
