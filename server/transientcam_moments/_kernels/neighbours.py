@@ -167,7 +167,7 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         moments, view = np.empty(raw.shape, np.complex64), picture(current)
         moments.real, moments.imag = view[0::2], view[1::2]
 
-        def search(both: Reals) -> Reals:
+        def search(both: Reals) -> Any:
             (planes, view), (best, seen) = room(2), room(3)
             view[...] = both
             over_rows(partial(look, (neighbours.LINES @ (row, 1)).ravel(), *planes, best))
