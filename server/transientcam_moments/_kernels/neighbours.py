@@ -173,9 +173,7 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             over_rows(partial(look, (neighbours.LINES @ (row, 1)).ravel(), *planes, best))
             return seen
 
-        final = np.ascontiguousarray(picture(share)[0])
-        return neighbours.finished(
-            raw, moments, final, weight, present, multiples, numbers, search=search
-        )
+        left = np.ascontiguousarray(picture(share)[0])
+        return neighbours.finished(raw, moments, left, weight, present, multiples, numbers, search)
 
     return kernel

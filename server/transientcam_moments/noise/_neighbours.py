@@ -260,7 +260,7 @@ def _clearest_line(both: Array) -> Array:
     xp, wide = namespace(both), _padded(both)
     best = xp.zeros((3, *both.shape[1:]), both.dtype)
     for line in LINES.tolist():
-        late, known = sum(_shifted(wide, *each) for each in line)
+        late, known = xp.stack([_shifted(wide, *each) for each in line]).sum(axis=0)
         clear = late**2 / xp.maximum(known, np.finfo(both.dtype).tiny)
         best = xp.where(clear > best[0], xp.stack([clear, late, known]), best)
     return best
