@@ -140,7 +140,9 @@ def serving(
         usual |= {"light": {"directory": f"{state}/light", "delay_s": 0.0, "unused_s": 0.0}}
         # a laden machine may take longer to ask for a frame than a service keeps it
         usual |= {"history": {"seconds": 3600.0}}
-        # the defaults depend on the kernels that other tests of this process have compiled
+        # not the defaults, which depend on the kernels that other tests of this process have
+        # compiled, and take NumPy half a second a frame; what they compute is tested by name, and
+        # as served in `offline/test_by_hand.py`
         usual |= {"reconstruction": {"estimator": "pisarenko", "neighbours": "gaussian"}}
         chosen = _patient(Settings(camera=camera, **{**usual, **settings}))
         app = build_app(opened, chosen)

@@ -47,7 +47,7 @@ NOISE = (
 FRAMES = 60
 STATING = ("wall", "corner", "mirrors")
 STATED_FRAMES = 40
-_PISARENKO = ReconstructionSettings(estimator="pisarenko")
+_PISARENKO = ReconstructionSettings(estimator="pisarenko", neighbours="gaussian")
 
 
 def predicted_and_observed() -> list[Compared]:

@@ -102,6 +102,7 @@ def errors(scene: str, waveform: Path, sequence: Capture, known: Calibration) ->
         zeroth=sequence.zeroth,
         takes=sequence.takes,
         estimator="maximum-entropy",
+        neighbours="gaussian",
     )
     gains = known.gains
     found = []

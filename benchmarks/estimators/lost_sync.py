@@ -84,6 +84,7 @@ def measure(scene: str, sequence: Capture, frames: int, bench: Bench, seed: int)
                 zeroth=sequence.zeroth,
                 takes=sequence.takes,
                 estimator="maximum-entropy",
+                neighbours="gaussian",
                 spoilt_images=each,
             ),
             calibration=gains,

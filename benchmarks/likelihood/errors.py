@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence
+from transientcam_driver.camera import Truth
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 from transientcam_moments.likelihood import MODEL_ERROR
 
@@ -103,7 +104,20 @@ def captured(bench: Bench, scene: str, sequence: Sequence) -> Captured:
     shot = bench.shot(scene, sequence, options=WITHOUT_OUTLIERS)
     gains = bench.calibration(sequence, options=WITHOUT_OUTLIERS).gains.planes
     settings = replace(shot.found.settings, sensor=tm.noise.Sensor())
-    return Captured(shot, gains, settings, np.where(shot.truth.lit, shot.truth.range_m, np.nan))
+    truth_m = _first_return_m(shot.truth, settings.threshold)
+    return Captured(shot, gains, settings, np.where(shot.truth.lit, truth_m, np.nan))
+
+
+def _first_return_m(truth: Truth, threshold: float) -> Array:
+    """Return the range (H, W) of the first return that counts, which is that of the surface seen.
+
+    But where less than ``threshold`` of the strongest return's light comes from there.
+    """
+    if truth.kind != "sparse":
+        return truth.range_m
+    first = (truth.weight >= threshold * truth.weight.max(axis=0)).argmax(axis=0)
+    delay_s = np.take_along_axis(truth.delay_s, first[None], axis=0)[0]
+    return np.where(first > 0, tm.SPEED_OF_LIGHT_M_S * delay_s / 2, truth.range_m)
 
 
 def turn_m(base_frequency_hz: float) -> float:

@@ -96,14 +96,30 @@ def _round(
         simd.store(left, p, select(there > 0.0, there * square * inverse * inverse, one))
 
 
-def _by_rows(run: Callable[..., Any], first: int, row: int, top: int, end: int) -> None:
-    run(first + top * row, first + end * row)
+@njit(nogil=True, error_model="numpy")
+def _clearest(
+    lines: Places, late: RealPlane, known: RealPlane, best: RealPlanes, start: int, stop: int
+) -> None:
+    one = simd.ones(late, 1)
+    for p in range(start, stop, simd.width(one)):
+        clearest, shift, whole = 0.0 * one, 0.0 * one, 0.0 * one
+        for line in range(0, len(lines), 9):  # of nine pixels each
+            by, of = 0.0 * one, 0.0 * one
+            for k in range(line, line + 9):
+                by = by + simd.load(one, late, p + lines[k])
+                of = of + simd.load(one, known, p + lines[k])
+            clear = by * by / larger(of, tiny(one))
+            better, clearest = clear > clearest, larger(clear, clearest)
+            shift, whole = select(better, by, shift), select(better, of, whole)
+        simd.store(best[0], p, clearest)
+        simd.store(best[1], p, shift)
+        simd.store(best[2], p, whole)
 
 
 def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile averaging over neighbours of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    average = entry(_round, m, precision)
+    average, look = entry(_round, m, precision), entry(_clearest, m, precision)
 
     def kernel(
         raw: Complexes,
@@ -119,11 +135,16 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         first = neighbours.REACH * (row + 1)
         length = 2 * first + height * row + LEAST_PIXELS
 
+        def picture(flat: Any) -> Any:
+            """Return the view of flat planes that is the picture."""
+            return flat[:, first : first + height * row].reshape(-1, height, row)[..., :width]
+
         def room(planes: int, fill: float = 0.0) -> tuple[Any, Any]:
-            """Return flat planes, and the view of them that is the picture."""
             flat = np.full((planes, length), fill, np.float32)
-            view = flat[:, first : first + height * row].reshape(planes, height, row)
-            return flat, view[..., :width]
+            return flat, picture(flat)
+
+        def over_rows(run: Callable[..., Any]) -> None:
+            spread(lambda top, end: run(first + top * row, first + end * row), height, _ROWS)
 
         given, view = room(2 * len(raw))
         view[0::2], view[1::2] = raw.real, raw.imag
@@ -140,14 +161,19 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             places = np.array([place for *_, place in near], np.float32)
             limits = 1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT
             planes = given, current, weights, there[0], share[0], ahead, places
-            run = partial(average, order, orders, *planes, *limits, other, left[0])
-            spread(partial(_by_rows, run, first, row), height, _ROWS)
+            over_rows(partial(average, order, orders, *planes, *limits, other, left[0]))
             current, other = other, spare if current is given else current
             share, left = left, share
-        moments = np.empty(raw.shape, np.complex64)
-        view = current[:, first : first + height * row].reshape(-1, height, row)[..., :width]
+        moments, view = np.empty(raw.shape, np.complex64), picture(current)
         moments.real, moments.imag = view[0::2], view[1::2]
-        final = share[0, first : first + height * row].reshape(height, row)[:, :width]
-        return moments, np.ascontiguousarray(final)
+
+        def search(both: Reals) -> Any:
+            (planes, view), (best, seen) = room(2), room(3)
+            view[...] = both
+            over_rows(partial(look, (neighbours.LINES @ (row, 1)).ravel(), *planes, best))
+            return seen
+
+        left = np.ascontiguousarray(picture(share)[0])
+        return neighbours.finished(raw, moments, left, weight, present, multiples, numbers, search)
 
     return kernel

@@ -32,12 +32,16 @@ EXPECTED: Final = 5.0
 """Chi-square of the clearest line of residuals that noise explains."""
 CLEAR: Final = 12.0
 """And from which it is taken back: noise exceeds it in one pixel of five thousand."""
-LINES: Final = (
+_STEPS: Final = (
     ((0, 1), (0, 2)), ((1, 0), (2, 0)), ((1, 1), (2, 2)), ((1, -1), (2, -2)),
     ((1, 0), (2, 1)), ((-1, 0), (-2, -1)), ((1, 0), (2, -1)), ((-1, 0), (-2, 1)),
     ((0, 1), (1, 2)), ((0, -1), (-1, -2)), ((0, 1), (-1, 2)), ((0, -1), (1, -2)),
 )  # fmt: skip
-"""In eight directions: rows and columns from every other pixel to the next, and the one after."""
+LINES: Final = np.array(
+    [[[n * a + i * b for a, b in zip(*each, strict=True)] for i in range(-2, 3) for n in (0, 1)]
+     for each in _STEPS]
+)[:, :-1]  # fmt: skip
+"""In eight directions: rows and columns of nine pixels around the middle one (12, 9, 2)."""
 
 
 class Averaged(NamedTuple):
@@ -138,8 +142,6 @@ def average_neighbours(
     raw = xp.where(present, moments, 0) * (1 / size)
     there = present.astype(real) if frames is None else xp.where(present, frames, 0).astype(real)
     found, share = _averaged(raw, weight, there, order, numbers, spread=spread)
-    found, share = _joined(raw, found, share, weight, there, order, numbers)
-    found, share = _given_back(raw - found, found, share, weight, order)
     averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
 
@@ -194,7 +196,7 @@ def _averaged(
                 total, square = total + counts, square + counts * agreement
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(there > 0, there * square / total / total, 1)
-    return current.astype(raw.dtype), share.astype(weight.dtype)
+    return finished(raw, current.astype(raw.dtype), share, weight, there, multiples, numbers)
 
 
 def _joined(
@@ -235,46 +237,33 @@ def _joined(
     return xp.where(lone, mean, found), xp.where(lone, its, share)
 
 
-def _given_back(
-    off: Array, current: Array, share: Array, weight: Array, multiples: tuple[int, ...]
-) -> tuple[Array, Array]:
-    """Return averages and shares once the clearest lines of residuals are looked at."""
-    xp = namespace(off)
+def finished(
+    raw: Array, current: Array, share: Array, weight: Array, there: Array,
+    multiples: tuple[int, ...], numbers: Array, search: Callable[[Array], Array] | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return averages and shares of all rounds once lone pixels and residuals are looked at."""
+    xp = namespace(raw)
+    current, share = _joined(raw, current, share, weight, there, multiples, numbers)
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
     scaled = order * weight
-    late = (scaled * (current.conj() * off).imag).sum(0)
+    late = (scaled * (current.conj() * raw).imag).sum(0)  # of what is left: their own is real
     known = (order * scaled * squared(current)).sum(0)
-    height, width = known.shape
-    row = width + REACH  # flat, with a margin between rows that serves both of them
-    least = np.finfo(weight.dtype).tiny
-    both = xp.pad(xp.stack([late, known]), [(0, 0), (REACH + 1, REACH + 1), (0, REACH)])
-    both, size = both.reshape((2, -1)), height * row
-    clearest, best = xp.zeros_like(both[0, :size]), xp.zeros_like(both[:, :size])
-    for line in LINES:
-        sums = _along(both, size, *(by * row + column for by, column in line))
-        clear = sums[0] ** 2 / xp.maximum(sums[1], least)
-        new = (clear > clearest).astype(clear.dtype)  # by products: no branch for each pixel
-        best = (1 - new) * best + new * sums
-        clearest = xp.maximum(clear, clearest)
-    shift, whole, clearest = (each.reshape((height, row))[:, :width] for each in (*best, clearest))
-    whole = xp.maximum(whole, least)
-    back = clearest > CLEAR
+    clearest, shift, whole = (search or _clearest_line)(xp.stack([late, known]))
+    whole, back = xp.maximum(whole, np.finfo(weight.dtype).tiny), clearest > CLEAR
     turned = (1j * order * xp.where(back, shift / whole, 0)).astype(current.dtype)
     doubt = xp.where(back, 1, xp.maximum(clearest - EXPECTED, 0)) * known / whole
-    return current + turned * current, xp.minimum(share + doubt, 1).astype(share.dtype)
+    return current + turned * current, xp.minimum(share + doubt, 1).astype(weight.dtype)
 
 
-def _along(planes: Array, length: int, near: int, far: int) -> Array:
-    """Return sums over lines of nine around the middle pixels, so many, of flat planes.
-
-    Each second pixel of a line is ``far`` beyond the last, and has another one ``near`` it.
-    """
-    first = (planes.shape[-1] - length) // 2
-    start, last, sums = first - 2 * far, first + 2 * far, planes
-    for step in (near, far, 2 * far):
-        sums = sums[:, : -abs(step)] + sums[:, abs(step) :]
-        start += min(step, 0)
-    return sums[:, start : start + length] + planes[:, last : last + length]
+def _clearest_line(both: Array) -> Array:
+    """Return the greatest chi-square of residuals along a line, and their sums along it."""
+    xp, wide = namespace(both), _padded(both)
+    best = xp.zeros((3, *both.shape[1:]), both.dtype)
+    for line in LINES.tolist():
+        late, known = xp.stack([_shifted(wide, *each) for each in line]).sum(axis=0)
+        clear = late**2 / xp.maximum(known, np.finfo(both.dtype).tiny)
+        best = xp.where(clear > best[0], xp.stack([clear, late, known]), best)
+    return best
 
 
 def _padded(planes: Array) -> Array:

@@ -26,6 +26,13 @@ def test_the_device_has_a_pattern_that_the_calibration_removes(
     assert np.median(error_m) < 0.005
 
 
+def test_captures_are_averaged_and_estimated_as_in_the_paper(wall: ReconstructedShot) -> None:
+    used = wall.found.settings
+
+    assert (used.neighbours, used.smoothing_sigma_px) == ("gaussian", 0.6)
+    assert used.estimator == "pisarenko"
+
+
 def test_a_capture_is_made_once_and_a_calibration_once_for_all_takes(bench: Bench) -> None:
     calibration = bench.calibration(SEQUENCE)
 

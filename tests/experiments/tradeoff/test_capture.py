@@ -33,7 +33,7 @@ def measured(camera: Camera, sequence: Sequence) -> dict[str, float | None]:
         capture.capture(camera, 2),
         lambda truth: sample_pixels(truth, pixels=100, seed=1),
         applied,
-        settings=ReconstructionSettings(smoothing_px=0.0),
+        settings=ReconstructionSettings(neighbours="none"),
         bits=camera.capabilities.bits,
     )
     assert set(values) == set(capture.QUANTITIES)

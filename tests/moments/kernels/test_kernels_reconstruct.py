@@ -31,7 +31,7 @@ def compiled() -> Iterator[None]:
 def settings_of(**changes: Any) -> tm.Settings:
     """Return the paper's settings with all that raw images need, one take at a low frequency."""
     labels: dict[str, Any] = {"base_frequency_hz": 23e6, "zeroth": "low-frequency", "takes": 1}
-    return tm.Settings(**(labels | {"estimator": "pisarenko"} | changes))
+    return tm.Settings(**(labels | {"estimator": "pisarenko", "neighbours": "gaussian"} | changes))
 
 
 @contextmanager

@@ -117,7 +117,7 @@ def test_metadata_and_memory_are_those_of_moments(
 def test_smoothing_and_biasing_are_the_relays_own(
     at_origin: transientcam.Camera, at_relay: transientcam.Camera, relay: Served
 ) -> None:
-    own = {"smoothing_px": 0.0, "bias": 0.1, "estimator": "pisarenko"}
+    own = {"neighbours": "none", "bias": 0.1, "estimator": "pisarenko"}
     before = at_relay.reconstruction
     at_relay.reconstruction = own
     try:

@@ -119,7 +119,7 @@ def recipe(zeroth: Zeroth) -> Recipe:
     with open_camera("sim:wall") as camera:
         applied = camera.validate(Sequence(harmonics=3, zeroth=zeroth))
         sensor = sensor_of(camera, SensorSettings())
-    unsmoothed = ReconstructionSettings(smoothing_px=0.0)
+    unsmoothed = ReconstructionSettings(neighbours="none")
     return Recipe(applied, unsmoothed, 65535.0, sensor=sensor)
 
 

@@ -45,7 +45,7 @@ SHAPE = (10, 12)
 DARK_DN = 64.0
 SEQUENCE = Sequence(harmonics=3, takes=1)
 PROTOTYPE = prototype(serial="SIM-ideal-0", width=SHAPE[1], height=SHAPE[0], bits=16)
-UNSMOOTHED = ReconstructionSettings(smoothing_px=0.0)
+UNSMOOTHED = ReconstructionSettings(neighbours="none")
 
 
 class Sensor:

@@ -144,7 +144,7 @@ def recipe_and_frame() -> tuple[Recipe, RawFrame, _Array]:
     delay_s = np.linspace(2e-9, 30e-9, sensor.delay_s.size).reshape(SHAPE)
     images = sensor.images(SEQUENCE, np.full(SHAPE, 900.0), delay_s).round().astype(np.uint16)
     raw = RawFrame(0, 1, images, SEQUENCE.labels, 0.0, 0.0, 0.1, 30.0, 0)
-    settings = ReconstructionSettings(smoothing_px=0.0, estimator="maximum-entropy")
+    settings = ReconstructionSettings(neighbours="none", estimator="maximum-entropy")
     recipe = Recipe(applied, settings, 4095.0, evaluate(capture).gains)
     return recipe, raw, 0.5 * 299_792_458.0 * delay_s
 
