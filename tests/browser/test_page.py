@@ -134,10 +134,11 @@ def test_nothing_hangs_over_the_edge_controls_have_names_and_type_three_sizes(pa
         page.locator(".panel-map, .panel-streak").first.wait_for()
         if layout == "Overview":
             page.get_by_role("button", name="Edit").click()
-        for width in (390, 1280):
+        for width in (320, 3840, 1280):
             page.set_viewport_size({"width": width, "height": 800})
             page.evaluate(_PAINTED)
             assert page.evaluate("document.documentElement.scrollWidth") <= width, layout
+            assert page.evaluate(_CUT_BUTTONS) == [], (layout, width)
         unnamed = page.evaluate(
             """() => [...document.querySelectorAll("button, select, input, [role=application]")]
                  .filter((it) => !(it.ariaLabel || it.textContent.trim() || it.labels?.length))
@@ -148,6 +149,14 @@ def test_nothing_hangs_over_the_edge_controls_have_names_and_type_three_sizes(pa
     assert sizes_px == {12, 13, 20}
 
 
+# whose words do not fit into them, or that stand over the edge of their panel; tabs are scrolled
+_CUT_BUTTONS = """
+() => [...document.querySelectorAll("button:not(.tabs *)")]
+    .filter((each) => each.checkVisibility())
+    .filter((each) => each.scrollHeight > each.clientHeight + 1 ||
+      each.getBoundingClientRect().right > (each.closest(".panel")?.getBoundingClientRect().right ?? innerWidth))
+    .map((each) => each.outerHTML)
+"""
 _SIZES_OF_TYPE_PX = """
 () => [...document.querySelectorAll("body *:not(svg *, noscript, script)")]
     .filter((each) => [...each.childNodes].some((it) => it.nodeType === 3 && it.data.trim()))

@@ -47,6 +47,13 @@ describe("a frame with too much or too little light", () => {
     expect(plain(advice?.long ?? "")).toContain(`${Math.max(saturated, saturated >= 10 ? 0 : dark)} % of the pixels`);
   });
 
+  test("is dark by few pixels where even the brightest have little light", () => {
+    const advice = (brightest_dn: number, no_signal = 18, exposure_s = 2e-5) =>
+      exposureAdvice(frame(0, no_signal, exposure_s), { ...CAMERA, bits: 12 }, brightest_dn);
+    expect(advice(40)).toMatchObject({ word: "Dark", exposure_s: 1.6e-4 });
+    expect([advice(300), advice(40, 1), advice(40, 18, 0.05)]).toEqual([null, null, null]);
+  });
+
   test("is named where no exposure mends it, and one with enough light is not", () => {
     expect(exposureAdvice(frame(100, 0, 2e-5), CAMERA)).toMatchObject({ word: "Saturated", exposure_s: null });
     for (const meta of [frame(9, 0), frame(0, 49), { exposure_s: 1, pixels: null } as FrameMeta, null])

@@ -98,7 +98,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_
           gap: 2,
           grid: { show: false },
           // Round numbers of metres, placed at the times they stand for.
-          splits: (_plot, _axis, low, high) => metres(low, high).map((range_m) => range_m / METRES_PER_NS),
+          splits: ({ width }, _axis, low, high) => metres(low, high, width).map((range_m) => range_m / METRES_PER_NS),
           values: (_plot, splits) => splits.map((time_ns) => `${Number((time_ns * METRES_PER_NS).toFixed(2))}\u202fm`),
         },
       ],
@@ -168,6 +168,6 @@ function tickText(value: number): string {
 
 const METRES_PER_NS = rangeOfTime_m(1e-9);
 
-function metres(low_ns: number, high_ns: number): number[] {
-  return ticks({ low: low_ns * METRES_PER_NS, high: high_ns * METRES_PER_NS, kind: "linear" }, 9);
+function metres(low_ns: number, high_ns: number, width_px: number): number[] {
+  return ticks({ low: low_ns * METRES_PER_NS, high: high_ns * METRES_PER_NS, kind: "linear" }, Math.min(9, width_px / 40));
 }

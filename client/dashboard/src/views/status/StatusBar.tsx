@@ -101,8 +101,7 @@ function slowed(state: State, trouble: string | null): State {
 /** That nothing in the camera switches its light off where the service fails. */
 function NoWatchdog() {
   const warning = useStore().camera.value?.light_warning ?? null;
-  if (warning === null) return null;
-  return <Sign field="light-warning" short="No watchdog" long={warning} />;
+  return warning === null ? null : <Sign field="light-warning" short="No watchdog" long={warning} />;
 }
 
 /** That less is asked for than there is, and what. */
@@ -149,14 +148,13 @@ function Fault() {
       </Steer>
     </span>
   );
-  const advice = exposureAdvice(shown, capabilities);
+  const advice = exposureAdvice(shown, capabilities, frames.of(frames.amplitude.value).value?.map?.high);
   // What was changed already shows with the frames to come.
   const changed = applied.exposure_s !== shown.exposure_s || applied.base_frequency_hz !== shown.base_frequency_hz;
   if (advice !== null) {
     const { word, long, exposure_s } = advice;
     if (exposure_s === null || changed) return <Sign field="exposure" short={word} long={long} />;
-    const set = () => sequencing.set({ ...applied, exposure_s });
-    return mend("exposure", word, `exposure ${engineering(exposure_s, "s", 2)}`, long, set);
+    return mend("exposure", word, `exposure ${engineering(exposure_s, "s", 2)}`, long, () => sequencing.set({ ...applied, exposure_s }));
   }
   const trust = rangeErrors.of("range_error").value?.meta.accuracy?.trust;
   if (trust != null && trust.drift > DRIFTED * Object.values(trust).reduce((sum, count) => sum + count)) {
