@@ -154,7 +154,8 @@ _CUT_BUTTONS = """
 () => [...document.querySelectorAll("button:not(.tabs *)")]
     .filter((each) => each.checkVisibility())
     .filter((each) => each.scrollHeight > each.clientHeight + 1 ||
-      each.getBoundingClientRect().right > (each.closest(".panel")?.getBoundingClientRect().right ?? innerWidth))
+      each.getBoundingClientRect().right >
+        (each.closest(".panel")?.getBoundingClientRect().right ?? innerWidth))
     .map((each) => each.outerHTML)
 """
 _SIZES_OF_TYPE_PX = """
