@@ -153,9 +153,10 @@ def test_nothing_hangs_over_the_edge_controls_have_names_and_type_three_sizes(pa
 _CUT_BUTTONS = """
 () => [...document.querySelectorAll("button:not(.tabs *)")]
     .filter((each) => each.checkVisibility())
-    .filter((each) => each.scrollHeight > each.clientHeight + 1 ||
-      each.getBoundingClientRect().right >
-        (each.closest(".panel")?.getBoundingClientRect().right ?? innerWidth))
+    .filter((each) => {
+      const edge = each.closest(".panel")?.getBoundingClientRect().right ?? innerWidth;
+      return each.scrollHeight > each.clientHeight + 1 || each.getBoundingClientRect().right > edge;
+    })
     .map((each) => each.outerHTML)
 """
 _SIZES_OF_TYPE_PX = """
