@@ -40,10 +40,18 @@ test("gaps are the times without light, before, between and after it", () => {
   [arrivals[2], arrivals[3], arrivals[7]] = [1, 0.5, 0.06];
   expect(gapsOf(arrivals)).toEqual([
     { first: 0, last: 0.2 },
-    { first: 0.4, last: 0.7 },
-    { first: 0.8, last: 1 },
+    { first: 0.35, last: 0.7 },
+    { first: 0.75, last: 1 },
   ]);
   expect(gapsOf(new Float32Array(10))).toEqual([]);
+});
+
+test("the end of a strong return's tail is no picture of its own, a weak return is", () => {
+  const arrivals = [0, 1, 0.4, 0.12, 0.08, 0.06, 0, 0, 0.08, 0.06];
+  expect(gapsOf(arrivals).map(({ first, last }) => [first, last])).toEqual([
+    [0, 0.1],
+    [0.35, 0.8],
+  ]);
 });
 
 test("arrivals are marked where most light comes, not where it only trembles", () => {
@@ -59,11 +67,11 @@ test("light that stays in sight shortens the gaps behind it, and no others", () 
   const arrivals = [0, 0, 1, 0, 0, 0, 0, 1, 0, 0];
   expect(gapsOf(arrivals).map(({ first, last }) => [first, last])).toEqual([
     [0, 0.2],
-    [0.3, 0.7],
-    [0.8, 1],
+    [0.25, 0.7],
+    [0.75, 1],
   ]);
   expect(gapsOf(arrivals, 0.2).map(({ first, last }) => [first, last])).toEqual([
     [0, 0.2],
-    [0.5, 0.7],
+    [0.45, 0.7],
   ]);
 });

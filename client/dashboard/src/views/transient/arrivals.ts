@@ -2,14 +2,19 @@
 
 import type { Lit } from "../../store/player";
 
-/** Share of the brightest moment's light from which a moment is worth a picture. */
+/** Share of the brightest moment's light from which a moment is worth a picture, and of the brightest in light that is not interrupted. */
 const LEAST = 0.05;
+const LEAST_OF_RUN = 0.1;
 
-/** At which times there is light. */
+/** At which times there is light: also of a weak return, but not to the end of a strong one's tail, which few pixels show. */
 function worthOf(arrivals: ArrayLike<number>): boolean[] {
   const all = Array.from(arrivals);
   const least = LEAST * Math.max(...all);
-  return all.map((value) => value > least && value > 0);
+  const most = all.map((value) => (value > least ? value : 0));
+  const spread = (to: number, from: number): number => (most[to] = most[to] && Math.max(most[to], most[from] ?? 0));
+  for (const at of all.keys()) spread(at, at - 1);
+  for (const at of [...all.keys()].reverse()) spread(at, at + 1);
+  return all.map((value, at) => most[at] > 0 && value > LEAST_OF_RUN * most[at]);
 }
 
 /** Turns, 0 to 1, evenly over the times at which light arrives and no others; over all times where none does. */
@@ -39,8 +44,9 @@ export function gapsOf(arrivals: ArrayLike<number>, trail = 0): Lit[] {
   const worth = worthOf(arrivals).map((_, at, all) => all.slice(Math.max(0, at - Math.floor(trail * all.length)), at + 1).includes(true));
   const lit = worth.flatMap((is, at) => (is ? [at] : []));
   const after = [...lit, worth.length];
-  const gaps = [-1, ...lit].map((at, n) => ({ first: (at + 1) / worth.length, last: after[n] / worth.length }));
-  return lit.length === 0 ? [] : gaps.filter(({ first, last }) => last > first);
+  // from a time with light to the next one without it there is light for half of the way
+  const gaps = [-1, ...lit].map((at, n) => ({ first: Math.max(0, at + 0.5) / worth.length, last: after[n] / worth.length }));
+  return lit.length === 0 ? [] : gaps.filter(({ first, last }) => (last - first) * worth.length > 0.75);
 }
 
 /** Ends that noise alone moves stay where they are. */
