@@ -1,8 +1,7 @@
 import { describe, expect, test } from "vitest";
-
-import { planeOf } from "../../../client/dashboard/src/views/map/plane";
 import { History, KEPT_S } from "../../../client/dashboard/src/views/plots/history";
 import { profileOf } from "../../../client/dashboard/src/views/plots/profile";
+import { planeOf } from "../../../client/dashboard/src/views/points/cloud";
 
 describe("values over time", () => {
   const values = (value: number): ReadonlyMap<string, number> => new Map([["a", value]]);

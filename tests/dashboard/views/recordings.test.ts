@@ -1,7 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { limitsOf } from "../../../client/dashboard/src/views/recordings/limits";
-import { annotationsOf, linesOf } from "../../../client/dashboard/src/views/recordings/lines";
+import { annotationsOf, limitsOf, linesOf } from "../../../client/dashboard/src/views/recordings/typed";
 import { bytes, duration } from "../../../client/dashboard/src/views/replay/words";
 
 describe("limits of a recording", () => {

@@ -4,7 +4,6 @@ import { effect } from "@preact/signals";
 import { refusalIn } from "./api";
 import type { LinkPart } from "./settings";
 import type { Store } from "./store";
-import { until } from "./until";
 
 /** Holds what is shown, keeps its frame at the service and copies a link that opens that very frame. */
 export async function share(target: Window, store: Store): Promise<void> {
@@ -116,4 +115,16 @@ async function open(store: Store, recording: string, frame: number | undefined):
     }
     status.unreadable.value = `The recording of this link cannot be shown: ${message}`;
   }
+}
+
+/** Waits until what is read from signals is there: resolves to the first answer that is not undefined. */
+function until<T>(read: () => T | undefined): Promise<T> {
+  return new Promise((resolve) => {
+    const end = effect(() => {
+      const found = read();
+      if (found === undefined) return;
+      resolve(found);
+      queueMicrotask(() => end());
+    });
+  });
 }

@@ -1,4 +1,4 @@
-import type { ReadonlySignal } from "@preact/signals";
+import { type ReadonlySignal, useComputed } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 
@@ -7,7 +7,6 @@ import { regionOf } from "../store/measures";
 import { type Pixel, stepped } from "../store/pixel";
 import { useStore } from "../store/store";
 import { type Point, placeIn, WHOLE } from "../store/viewport";
-import { FirstFrame } from "./FirstFrame";
 import { useComputedOf, usePictureSize } from "./hooks";
 import { Marks } from "./Marks";
 import "./Stage.css";
@@ -197,4 +196,18 @@ export function Stage({ label, frame, children }: StageProps) {
       )}
     </div>
   );
+}
+
+/** In the place of a picture before its first frame: what is waited for. */
+export function FirstFrame() {
+  const { status, cameraless } = useStore();
+  const words = useComputed(() => {
+    if (status.connection.value.kind === "refused") return "Pictures are shown to those with a token.";
+    if (status.connection.value.kind === "waiting") return "There is no connection to the service.";
+    if (cameraless.value) return "No camera is chosen yet.";
+    if (status.cameraLoss.value !== null) return "The camera was lost before its first frame.";
+    if (status.running.value === false) return "The camera stands still: Start or Single takes a frame.";
+    return "Waiting for the first frame";
+  });
+  return <p class="stage-empty cover">{words}</p>;
 }

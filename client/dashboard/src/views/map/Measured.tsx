@@ -9,9 +9,9 @@ import { figuresOf, type RegionFigures } from "../../store/measures";
 import { useStore } from "../../store/store";
 import { Remove } from "../../ui/controls";
 import { useComputedOf, useDrawing } from "../../ui/hooks";
+import { planeOf } from "../points/cloud";
 import { lensOf } from "../points/lens";
 import { PinsRow } from "./PinsRow";
-import { planeOf } from "./plane";
 import "./Measured.css";
 
 const BINS = 64;

@@ -15,8 +15,7 @@ import { RecordingRow } from "./RecordingRow";
 import "./RecordForm.css";
 import "./RecordingsView.css";
 import { Dialog } from "../../ui/Dialog";
-import { limitsOf } from "./limits";
-import { annotationsOf, type Line, linesOf } from "./lines";
+import { annotationsOf, type Line, limitsOf, linesOf } from "./typed";
 
 /** Recordings: start and stop one, look through them, play them, take them home. */
 export function RecordingsView() {

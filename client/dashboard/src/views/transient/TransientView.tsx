@@ -8,7 +8,7 @@ import { GATE_S, gateStart_rad, NAMES, type Play, type TransientLook } from "../
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
-import { Button, Check, Choice, Tabs } from "../../ui/controls";
+import { Button, Check, Choice, ColourChoice, Tabs, ToneChoice } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { captionOf, timeWords } from "../../ui/figure";
 import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
@@ -22,7 +22,6 @@ import { LightSoFar, Picture } from "./Picture";
 import { PICTURES, stripOf } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
 import "./TransientView.css";
-import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
 import { PopoverButton } from "../../ui/PopoverButton";
 
 const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
