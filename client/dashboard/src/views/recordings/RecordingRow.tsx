@@ -1,4 +1,4 @@
-import { grouped } from "../../scales/format";
+import { engineering, grouped } from "../../scales/format";
 import { recordingPath } from "../../store/api";
 import { END_REASONS } from "../../store/events";
 import { useStore } from "../../store/store";
@@ -8,7 +8,7 @@ import { Button } from "../../ui/controls";
 import { download } from "../../ui/download";
 import { PlayIcon } from "../../ui/icons";
 import type { Task } from "../../ui/useTask";
-import { bytes, clock, duration } from "../replay/words";
+import { clock, duration } from "../replay/words";
 import "./RecordingRow.css";
 
 const STATES: Readonly<Record<RecordingDocument["state"], string | null>> = {
@@ -57,7 +57,7 @@ export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps
           <span>{clock(recording.started_s)}</span>
           <span data-field="duration">{duration(recording.duration_s)}</span>
           <span data-field="frames">{grouped(recording.frames)} frames</span>
-          <span data-field="size">{bytes(recording.size_bytes)}</span>
+          <span data-field="size">{engineering(recording.size_bytes, "B")}</span>
           {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
         </p>
         {notes.length > 0 && <p class="small recording-notes">{notes.join(" · ")}</p>}

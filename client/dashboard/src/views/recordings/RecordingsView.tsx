@@ -1,6 +1,6 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-import { grouped } from "../../scales/format";
+import { engineering, grouped } from "../../scales/format";
 import { ORDERS, PAGE, PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
 import type { RecordingDocument, RecordingsDocument } from "../../stream/documents";
@@ -10,7 +10,7 @@ import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
 import { OpenButton } from "../files/FileDrop";
-import { bytes, duration } from "../replay/words";
+import { duration } from "../replay/words";
 import { RecordingRow } from "./RecordingRow";
 import "./RecordForm.css";
 import "./RecordingsView.css";
@@ -36,7 +36,7 @@ export function RecordingsView() {
         <>
           {known?.free_bytes != null && (
             <span class="quiet" title={known.directory}>
-              {bytes(known.free_bytes)} free
+              {engineering(known.free_bytes, "B")} free
             </span>
           )}
           <OpenButton kind=".h5" title="Show a recording of this service by the file that was downloaded" />
@@ -93,7 +93,7 @@ function Looking({ known: { totals, tags } }: { known: RecordingsDocument }) {
       <span class="quiet" data-field="recordings-found">
         {totals.recordings === 0
           ? "No recording has all of these words."
-          : `${grouped(totals.recordings)} recordings, ${grouped(totals.frames)} frames, ${bytes(totals.size_bytes)}, ${duration(totals.duration_s)}`}
+          : `${grouped(totals.recordings)} recordings, ${grouped(totals.frames)} frames, ${engineering(totals.size_bytes, "B")}, ${duration(totals.duration_s)}`}
       </span>
     </div>
   );
@@ -115,7 +115,7 @@ function Running({ recording, task }: { recording: RecordingDocument; task: Task
       <span data-field="recording-frames">
         {grouped(recording.frames)} <span class="quiet">frames</span>
       </span>
-      <span data-field="recording-size">{bytes(recording.size_bytes)}</span>
+      <span data-field="recording-size">{engineering(recording.size_bytes, "B")}</span>
       {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
       <span class="grow" />
       {replay.recording.value?.id !== recording.id && (

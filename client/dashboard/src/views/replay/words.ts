@@ -1,5 +1,5 @@
-/** Sizes, durations and times of recordings, for people. */
-import { engineering, fixed, NOTHING } from "../../scales/format";
+/** Durations and times of recordings, for people. */
+import { fixed, NOTHING } from "../../scales/format";
 
 /** A date as the reader's country writes it, and a time of 24 hours. */
 export function clock(unix_s: number | null): string {
@@ -14,8 +14,4 @@ export function duration(span_s: number): string {
   const [hours, minutes, seconds] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
   const two = (value: number): string => String(value).padStart(2, "0");
   return hours > 0 ? `${hours}:${two(minutes)}:${two(seconds)}\u202fh` : `${minutes}:${two(seconds)}\u202fmin`;
-}
-
-export function bytes(size: number): string {
-  return engineering(size, "B");
 }

@@ -7,8 +7,8 @@ from typing import TypeVar
 from crc32c import crc32c
 
 from transientcam_driver.camera import IMAGE_HEADER_BYTES, Capabilities
-from transientcam_driver.cameras.open_usb.protocol._codes import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.cameras.open_usb.protocol._requests import VERSION
+from transientcam_driver.cameras.open_usb.protocol._sequences import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.cameras.open_usb.protocol._units import nanoseconds
 from transientcam_driver.errors import FirmwareTooOld, ProtocolError
 

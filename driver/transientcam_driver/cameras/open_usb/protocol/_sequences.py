@@ -4,11 +4,15 @@ import struct
 from dataclasses import dataclass
 
 from transientcam_driver.camera import Capabilities
-from transientcam_driver.cameras.open_usb.protocol._codes import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.cameras.open_usb.protocol._requests import VERSION
 from transientcam_driver.cameras.open_usb.protocol._units import nanoseconds, phase_rad, phase_word
 from transientcam_driver.errors import ProtocolError
-from transientcam_driver.sequence import Sequence, SubPhases
+from transientcam_driver.sequence import Scheme, Sequence, SubPhases, TakeOrder, Zeroth
+
+# choices in the order of their codes (usb-protocol 5.1)
+ZEROTHS: tuple[Zeroth, ...] = ("on-off", "low-frequency", "estimated")
+SCHEMES: tuple[Scheme, ...] = ("none", "arccos", "harmonic-cancellation")
+TAKE_ORDERS: tuple[TakeOrder, ...] = ("sequential", "interleaved")
 
 
 @dataclass(frozen=True, slots=True)
