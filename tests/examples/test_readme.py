@@ -88,6 +88,7 @@ def test_blocks_pasted_whole_run_to_their_end(tmp_path: Path) -> None:
             "TRANSIENTCAM_PORT": port,
             "TRANSIENTCAM_KERNELS": "off",
             "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": "pisarenko",
+            "TRANSIENTCAM_RECONSTRUCTION__NEIGHBOURS": "gaussian",
         },
         capture_output=True,
         text=True,

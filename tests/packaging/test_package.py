@@ -118,6 +118,7 @@ def url(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[s
         "PATH": str(installed / "bin"),
         "HOME": str(home),
         "TRANSIENTCAM_KERNELS": "off",
+        "TRANSIENTCAM_RECONSTRUCTION__NEIGHBOURS": "gaussian",
         "PYTHONUNBUFFERED": "1",
     }
     command = [str(installed / "bin" / "transientcam"), "serve", "--port", "0"]

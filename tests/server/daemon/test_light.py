@@ -47,6 +47,7 @@ class Daemon:
             text=True,
             env=camera.environment
             | {"NUMBA_DISABLE_JIT": "1", "COLUMNS": "200"}
+            | {"TRANSIENTCAM_RECONSTRUCTION__NEIGHBOURS": "gaussian"}
             | {f"TRANSIENTCAM_{name}": value for name, value in given.items()},
         )
         assert self.process.stdout is not None

@@ -36,7 +36,11 @@ from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
 PATIENCE_S = 60.0
-QUICK = {"TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": "pisarenko"}
+# without kernels the defaults take half a second a frame, and longer on a laden machine
+QUICK = {
+    "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": "pisarenko",
+    "TRANSIENTCAM_RECONSTRUCTION__NEIGHBOURS": "gaussian",
+}
 
 
 def environment(**variables: str) -> dict[str, str]:

@@ -124,6 +124,7 @@ def hung(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", httpx.Client
             "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path]),
             "NUMBA_DISABLE_JIT": "1",
             "COLUMNS": "200",
+            "TRANSIENTCAM_RECONSTRUCTION__NEIGHBOURS": "gaussian",
             "STATE_DIRECTORY": str(tmp_path),
             "TRANSIENTCAM_RECORDINGS__MIN_FREE_BYTES": "0",
             "TRANSIENTCAM_RECORDINGS__STALLED_S": "1.0",
