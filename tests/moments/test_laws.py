@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 from hypothesis.extra import numpy as st_numpy
 
 import transientcam_moments as tm
@@ -168,6 +168,8 @@ def test_one_poisoned_pixel_changes_no_other(stage: str, dtype: type, poison: fl
         elements=st.floats(width=32, allow_nan=True, allow_infinity=True, allow_subnormal=True),
     )
 )
+@example(np.full((4, 1, 2), np.array([2.2736942e38, np.inf]), np.float32))
+@example(np.full((4, 1, 2), 2.2736942e38, np.float32))
 @settings(deadline=None, max_examples=200)
 def test_no_moments_at_all_raise_or_give_unflagged_nonsense(parts: np.ndarray) -> None:
     b = parts.view(np.complex64)[..., 0]

@@ -246,7 +246,7 @@ def redo(b: Array, found: Sequence[Array], ill: Array, noise: float) -> None:
         for coarser in (1e2, 1e4, 1e6):
             _take_if_better(wide, better, coarser * noise, enough)
         phase, weight, uniform = polish(wide, *better, tolerance=enough / 4)
-        weight = weight.astype(found[1].dtype)
+        weight, uniform = weight.astype(found[1].dtype), uniform.astype(found[2].dtype)
         # what is less than the least number of that precision isn't a return
         phase = in_turn(np.where(weight > 0, phase, np.nan).astype(found[0].dtype))
     ascending = np.argsort(phase, axis=0)

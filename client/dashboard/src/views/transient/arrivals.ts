@@ -7,14 +7,14 @@ const LEAST = 0.05;
 const LEAST_OF_RUN = 0.1;
 
 /** At which times there is light: also of a weak return, but not to the end of a strong one's tail, which few pixels show. */
-function worthOf(arrivals: ArrayLike<number>): boolean[] {
+function worthOf(arrivals: ArrayLike<number>, ofRun = LEAST_OF_RUN): boolean[] {
   const all = Array.from(arrivals);
   const least = LEAST * Math.max(...all);
   const most = all.map((value) => (value > least ? value : 0));
   const spread = (to: number, from: number): number => (most[to] = most[to] && Math.max(most[to], most[from] ?? 0));
   for (const at of all.keys()) spread(at, at - 1);
   for (const at of [...all.keys()].reverse()) spread(at, at + 1);
-  return all.map((value, at) => most[at] > 0 && value > LEAST_OF_RUN * most[at]);
+  return all.map((value, at) => most[at] > 0 && value > ofRun * most[at]);
 }
 
 /** Turns, 0 to 1, evenly over the times at which light arrives and no others; over all times where none does. */
@@ -30,7 +30,7 @@ export function turnsOf(arrivals: ArrayLike<number>, count: number): number[] {
 
 /** From when to when there is light, in shares of the period, with a little dark around it; null where there is none. */
 export function litOf(arrivals: ArrayLike<number>): Lit | null {
-  const worth = worthOf(arrivals);
+  const worth = worthOf(arrivals, 0);
   if (!worth.includes(true)) return null;
   const room = 0.02;
   return {
