@@ -22,9 +22,8 @@ from transientcam_server.recording import Recording
 from transientcam_server.settings import ReconstructionSettings
 
 FRAMES = 2 * BLOCK_FRAMES + 4
-SETTINGS = ReconstructionSettings(
-    estimator="pisarenko"
-)  # the quickest: what is held is who computes
+# the quickest, and as it was recorded: what is held is who computes
+SETTINGS = ReconstructionSettings(estimator="pisarenko", neighbours="gaussian")
 OPTIONS = BatchOptions(("range",), SETTINGS)
 HOLD = Hold(
     "transientcam_server.offline._cluster",

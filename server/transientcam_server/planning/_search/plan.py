@@ -385,17 +385,17 @@ def plan(
     found = families(goal, predictor, capabilities)
     candidates = curves(found, goal, predictor, timed)
     unlimited = curves(found, goal.without_budgets(), predictor, timed)
-    targets, leading = goal.limits, goal.leading
+    targets, leading, scene = goal.limits, goal.leading, predictor.scene
     best = best_choice(candidates, targets, leading)
     if best is None or best.relative_errors(targets)[1] > 1:
         missed = shortfall(goal, best, candidates, unlimited)
-        seen = {name: getattr(predictor.scene, name) for name in ("of_one_frame", "calibrated")}
+        seen = {name: getattr(scene, name) for name in ("of_one_frame", "calibrated")}
         raise refusal(goal, missed, **seen)
     progress.at(0.7, "half the time")
     best, half_time = shortened(best, candidates, targets, leading)
     progress.at(0.8, "twice the accuracy")
-    twice = quickest(unlimited, {leading: best.error(leading) / 2}, contenders=1)
-    scene = predictor.scene
+    half = best.error(leading) / 2  # of nothing there is none
+    twice = quickest(unlimited, {leading: half}, contenders=1) if half else None
     progress.at(0.9, "what would buy most")
     better = changes(best, goal, predictor, capabilities)
     words, sequence = summary(best, twice, scene) + scene.conditions, best.applied.sequence
