@@ -107,7 +107,7 @@ class Choice:
         Targets are reached where the latter is 1 at most.
         """
         error, with_margin = (
-            max((of(name) / limit for name, limit in targets.items()), default=0.0)
+            max((of(name) / max(limit, 1e-12) for name, limit in targets.items()), default=0.0)
             for of in (self.error, self.error_with_margin)
         )
         return error, with_margin

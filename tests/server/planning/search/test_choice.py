@@ -1,6 +1,7 @@
 """Choices: their errors by target, their cost and their words."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -35,6 +36,10 @@ def test_relative_errors_are_the_worst_over_all_targets(capabilities: Capabiliti
     )
     assert one.relative_errors({"range_std_m": 4e-3, "bound_width": 1.0}) == (1.5, 1.5)
     assert one.relative_errors({}) == (0.0, 0.0)
+    # half of what a perfect choice leaves, and what no other one reaches
+    perfect = replace(one, separation_share=1.0)
+    assert perfect.relative_errors({"separation_m": 0.0}) == (0.0, 0.0)
+    assert min(replace(one, separation_share=0.9).relative_errors({"separation_m": 0.0})) > 1e9
 
 
 def test_computing_takes_its_share_of_the_time_between_frames(capabilities: Capabilities) -> None:
