@@ -115,7 +115,8 @@ def moment_noise(
     # signal(theta) + signal(theta + 180 degrees) = b_0 + 2 ambient
     mean = sensor.image_variance((light + 2 * ambient) / 2)
     phasor = (phase_noise(phases_rad) * mean + xp.zeros_like(light)).astype(light.dtype)
-    factor = (1 / (takes * size)).astype(light.dtype)
+    with np.errstate(divide="ignore"):  # of pixels without gain nothing is known
+        factor = (1 / (takes * size)).astype(light.dtype)
     variance = phasor * factor
     if zeroth == "low-frequency":
         return MomentNoise(variance)

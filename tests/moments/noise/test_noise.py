@@ -181,6 +181,18 @@ def test_variance_falls_with_takes_and_grows_with_lost_modulation(
     np.testing.assert_allclose(weak.variance * factor**2, one.variance, rtol=1e-9)
 
 
+def test_of_pixels_without_gain_nothing_is_known_and_no_warning_says_so() -> None:
+    gain = np.full((4, 2), 0.5)
+    gain[1:, 1] = 0.0
+    light = np.full(2, 800.0)
+
+    found = noise.moment_noise(light, SENSOR, calibration=gain, zeroth="on-off")
+    alone = noise.moment_noise(light, SENSOR, calibration=np.full(4, 0.5), zeroth="on-off")
+
+    np.testing.assert_allclose(found.variance[:, 0], alone.variance[:, 0])
+    assert np.isinf(found.variance[1:, 1]).all()
+
+
 def test_ambient_light_adds_its_electrons_of_both_images() -> None:
     dark = noise.moment_noise(
         np.array([100.0]), SENSOR, calibration=np.ones(2), zeroth="low-frequency"
