@@ -123,6 +123,21 @@ def test_the_image_is_known_as_a_container() -> None:
     assert inside_container(image_environment(), root=_DOCKER)
 
 
+def test_every_image_of_others_is_named_by_its_digest() -> None:
+    """A tag is another image each time its registry makes it anew."""
+    bases = re.findall(
+        r"^ARG BASE=(.+)$",
+        "\n".join((_DOCKER / each / "Dockerfile").read_text() for each in (".", "ros2")),
+        re.MULTILINE,
+    )
+    served = [each["image"] for each in services().values() if "build" not in each]
+
+    assert len(bases) == 2
+    assert len(served) >= 2
+    for image in (*bases, *served):
+        assert re.search(r"@sha256:[0-9a-f]{64}\}?$", image), image
+
+
 def test_usb_comes_by_a_rule_that_replugging_survives() -> None:
     usb = services()["usb"]
 
