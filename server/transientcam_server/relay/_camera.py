@@ -28,7 +28,7 @@ from transientcam_server.imaging import NOMINAL_ID
 from transientcam_server.relay._delivery import Delivery
 from transientcam_server.relay._frames import RAW, SUBSCRIBED, Collector, Parts, capture_of
 from transientcam_server.relay._origin import Described, Origin, require_same_camera
-from transientcam_server.relay._reports import RelayCounters, hops_of, status_of
+from transientcam_server.relay._reports import RelayCounters, hops_of, lost_at_origin, status_of
 
 _log = logging.getLogger("transientcam_server.relay.camera")
 _SLICE_S: Final = 0.05
@@ -297,7 +297,7 @@ class RelayCamera(HostCamera):
         except CameraLost as error:
             raise self._lost(error.reason) from error
         if document["state"] == "lost":
-            raise self._lost(f"the origin has lost its camera: {document['reason']}")
+            raise self._lost(lost_at_origin(document["reason"]))
         if document["state"] != "calibrating":  # frames go on afterwards
             self._follow(document["state"] in _CAPTURING)
         return document
@@ -368,7 +368,7 @@ class RelayCamera(HostCamera):
         """Note what a notice of the stream says; it is acted on between two messages."""
         match notice.kind:
             case "camera-lost":
-                self._gone = f"the origin has lost its camera: {notice.details.get('reason')}"
+                self._gone = lost_at_origin(notice.details.get("reason"))
             case "calibration-changed" | "simulation-changed":
                 self._outdated = True
             case "reconstruction-changed" if not self.has_images:  # of corrupt ones, it may be

@@ -8,6 +8,7 @@ from transientcam.documents import FrameMeta
 from transientcam_driver import Status
 from transientcam_driver.camera import DeviceState, Hop, StatusFlag
 
+_LOST_AT_ORIGIN = "the origin has lost its camera: "
 _FLAGS = {
     "light_on": StatusFlag.LIGHT_ON,
     "interlock_closed": StatusFlag.INTERLOCK_CLOSED,
@@ -35,6 +36,12 @@ def hops_of(
     )
     left_s = meta["host_time_s"] + sum(hop.latency_s for hop in before)
     return (*before, Hop(service_id, now_unix_s - left_s, missed_frames))
+
+
+def lost_at_origin(reason: object) -> str:
+    """Return why the camera was lost, once, however many relays say so of the one before."""
+    last = str(reason).rpartition(_LOST_AT_ORIGIN)[2]
+    return _LOST_AT_ORIGIN + last.removeprefix("the camera was lost: ")
 
 
 def status_of(document: Mapping[str, Any], *, epoch: int) -> Status:

@@ -10,7 +10,7 @@ import pytest
 from transientcam_driver import CameraLost, CameraName, SpecError
 from transientcam_driver.camera import Hop
 from transientcam_server.relay import PLUGIN, Origin, RelayCamera
-from transientcam_server.relay._reports import hops_of
+from transientcam_server.relay._reports import hops_of, lost_at_origin
 
 
 @pytest.mark.parametrize(
@@ -75,3 +75,13 @@ def test_each_hop_counts_from_the_arrival_at_the_one_before() -> None:
     meta = {"host_time_s": 1000.0, "hops": [first]}
     found = hops_of(meta, service_id="b", now_unix_s=1001.0, missed_frames=1)  # type: ignore[arg-type]
     assert found == (Hop("a", 0.25, 3), Hop("b", 0.75, 1))
+
+
+def test_the_reason_of_a_loss_is_said_once_by_a_chain_of_relays() -> None:
+    reason = str(CameraLost("it is disconnected"))
+
+    for _ in range(3):
+        reason = str(CameraLost(lost_at_origin(reason)))
+
+    sentence = "the camera was lost: the origin has lost its camera: it is disconnected"
+    assert reason == sentence
