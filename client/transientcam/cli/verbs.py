@@ -27,7 +27,12 @@ _EXTRA_OF_PACKAGE: Final = {
 
 
 def load_verbs(app: typer.Typer, arguments: Sequence[str]) -> None:
-    """Add the verb that ``arguments`` name to ``app``, or all of them where they name none."""
+    """Add the verb that ``arguments`` name to ``app``, or all of them where they name none.
+
+    The version is printed without any.
+    """
+    if "--version" in arguments[:1]:
+        return
     points = {point.name: point for point in entry_points(group=GROUP)}
     named = next((each for each in arguments if not each.startswith("-")), None)
     chosen = [points[named]] if named in points else [points[name] for name in sorted(points)]

@@ -53,7 +53,11 @@ def test_every_verb_explains_its_options(capsys: pytest.CaptureFixture[str]) -> 
         assert f"transientcam {point.name}" in capsys.readouterr().out
 
 
-def test_the_version_is_the_package_s(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_version_is_the_package_s_and_loads_no_verb(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(EntryPoint, "load", lambda point: pytest.fail(f"{point.name} is loaded"))
+
     assert run(["--version"]) == 0
     assert capsys.readouterr().out == f"transientcam {transientcam.__version__}\n"
 
