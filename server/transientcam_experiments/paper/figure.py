@@ -1,13 +1,19 @@
 """The types that all figures share: pictures, statements of the paper, and tables."""
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 from transientcam_experiments.paper.bench import Bench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Picture
+
+_TEXTS: Final = tomllib.loads(Path(__file__).with_name("figures.toml").read_text("utf-8"))
+"""Of each figure title and caption, and the paper's sentences with their limits."""
+_WORDED: Final = ("says", "measure", "otherwise")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +69,21 @@ def check(
     )  # fmt: skip
 
 
+def state(key: str, value: float, **given: Any) -> Statement:
+    """Check a value against a sentence that ``figures.toml`` has.
+
+    ``key`` is the figure's number and the sentence's name, as "08.separated". What ``given`` has of
+    `check`'s arguments stands in place of that in the file; the rest fills in its texts.
+    """
+    figure, name = key.split(".")
+    stated = _TEXTS[f"figure{figure}"][name]
+    worded = {field: stated[field].format(**given) for field in _WORDED if field in stated}
+    limits = {
+        field: given[field] for field in ("at_least", "at_most", "otherwise") if field in given
+    }
+    return check(value=value, **(stated | worded | limits))
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """Numbers beside a figure; cells are text, numbers, or None where there is no value."""
@@ -98,3 +119,9 @@ class PaperFigure:
     """What our picture shows, and how it was captured."""
     make: Callable[[Bench], FigureResult]
     """Captures, computes and draws."""
+
+
+def figure(number: int, make: Callable[[Bench], FigureResult]) -> PaperFigure:
+    """Return a figure with the title and caption that ``figures.toml`` has for it."""
+    texts = _TEXTS[f"figure{number:02d}"]
+    return PaperFigure(number, texts["title"], texts["caption"], make)

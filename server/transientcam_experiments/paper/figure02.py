@@ -8,7 +8,7 @@ import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 
 SEQUENCE: Final = Sequence(base_frequency_hz=11.5e6, harmonics=7, takes=20)
 _FRAME_S: Final = 19.3e-9
@@ -46,39 +46,10 @@ def _statements(b: Array, phase: Array, density: Array) -> list[Statement]:
     reciprocal = np.abs(np.fft.rfft(1 / density, axis=0))
     beyond = reciprocal[_ORDER + 1 :].max(axis=0) / reciprocal[0]
     return [
-        check(
-            "Sec. 3.2",
-            "The solution fulfils Eq. (1): it matches all measurements exactly.",
-            "worst error of the moments of the reconstructed densities, by quadrature, over b_0",
-            float((np.abs(again - b) / b[0].real).max()),
-            at_most=1e-6,
-            form="{:.1e}",
-        ),
-        check(
-            "Sec. 3.3",
-            "The reconstruction is known to be a positive density.",
-            "least density over the mean density, all pixels and phases",
-            float((density.min(axis=0) * 2 * np.pi / b[0].real).min()),
-            at_least=1e-12,
-            form="{:.1e}",
-        ),
-        check(
-            "Fig. 2",
-            "The signal is the reciprocal of a Fourier series with frequencies up to m.",
-            "largest coefficient of 1/h beyond m over its mean",
-            float(beyond.max()),
-            at_most=1e-9,
-            form="{:.1e}",
-        ),
-        check(
-            "Sec. 3.3",
-            "A common inverse Fourier transform sets the unknown coefficients to zero; the maximum "
-            "entropy estimate should be preferred where the density is known to be positive.",
-            "share of pixels in which the common inverse Fourier transform goes negative",
-            float((_inverse_fourier(b, phase).min(axis=0) < 0).mean()),
-            at_least=0.5,
-            form="{:.0%}",
-        ),
+        state("02.matches", float((np.abs(again - b) / b[0].real).max())),
+        state("02.positive", float((density.min(axis=0) * 2 * np.pi / b[0].real).min())),
+        state("02.reciprocal", float(beyond.max())),
+        state("02.fourier", float((_inverse_fourier(b, phase).min(axis=0) < 0).mean())),
     ]
 
 
@@ -175,10 +146,4 @@ def _draw_moments(part: Any, shot: ReconstructedShot, y: int, x: int) -> None:
     style.scale(part, list(panels.flat), "DN")
 
 
-FIGURE: Final = PaperFigure(
-    2,
-    "Signal formation and reconstruction",
-    "The scene `mirrors` at m = 7, f = 11.5 MHz, 20 takes, so that there are m + 1 = 8 images of "
-    "moments as in the paper. One pixel (circle) is followed from its returns to its density.",
-    make,
-)
+FIGURE: Final = figure(2, make)

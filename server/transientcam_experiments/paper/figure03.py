@@ -12,7 +12,7 @@ from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Scheme
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_server.errors import InputError
 
 _F_HZ: Final = 23e6
@@ -143,46 +143,13 @@ def _statements(curves: dict[str, dict[Steps, Array]]) -> list[Statement]:
     }
     at_eight = {name: _distortion(each[Steps("arccos", 8)]) for name, each in curves.items()}
     return [
-        check(
-            "Fig. 3",
-            "For n = 8 the modulation arising from a triangular one is close to a sinusoidal.",
-            "total harmonic distortion of the triangle with arccos sampling, n = 8",
-            at_eight["triangle"],
-            at_most=0.01,
-            form="{:.2%}",
+        state("03.triangle", at_eight["triangle"]),
+        state(
+            "03.in_practice", max(value for name, value in at_eight.items() if name != "triangle")
         ),
-        check(
-            "Sec. 4.1",
-            "In practice n = 8 yields a satisfactory approximation to a sinusoidal.",
-            "the same of the measured waveform, the worst",
-            max(value for name, value in at_eight.items() if name != "triangle"),
-            at_most=0.02,
-            form="{:.2%}",
-        ),
-        check(
-            "Sec. 4.1",
-            "The sum approaches a perfect sinusoidal for n to infinity.",
-            "distortion of the triangle at the largest n over that at n = 1",
-            arccos[-1] / arccos[0],
-            at_most=0.1,
-            form="{:.1%}",
-        ),
-        check(
-            "Sec. 4.1",
-            "Harmonic cancellation is free of harmonic frequencies up to harmonic 2 n - 1.",
-            "largest of these harmonics over the fundamental, n = 2 to 4, all waveforms",
-            cancelled,
-            at_most=2e-4,
-            form="{:.1e}",
-        ),
-        check(
-            "Sec. 4.1",
-            "Phase steps do not increase measurement times.",
-            "different capture times among all schemes",
-            len(times),
-            at_most=1,
-            form="{:.0f}",
-        ),
+        state("03.limit", arccos[-1] / arccos[0]),
+        state("03.cancellation", cancelled),
+        state("03.no_longer", len(times)),
     ]
 
 
@@ -285,13 +252,4 @@ def _draw_distortion(axes: Any, name: str, each: dict[Steps, Array]) -> None:
     axes.legend()
 
 
-FIGURE: Final = PaperFigure(
-    3,
-    "Sinusoidal modulation by phase steps",
-    "Column x of the sensor sees a return x / 163 of a period late, so that one difference of two "
-    "opposite images is the effective modulation over a whole period. It is measured over USB for "
-    "a triangular waveform and for one with the third harmonic that was measured on the paper's "
-    "model of camera, without noise, with arccos sampling and with harmonic cancellation. The "
-    "simulated device takes the first nine harmonics of a waveform.",
-    make,
-)
+FIGURE: Final = figure(3, make)

@@ -7,7 +7,7 @@ import numpy as np
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_experiments.paper.synthetic import PIXEL
 
 _M: Final = 5
@@ -103,43 +103,17 @@ def _statements(
     moved = [np.abs(close[1] - close[0]).mean(), np.abs(close[2] - close[0]).mean()]
     return [
         *(
-            check(
-                "Fig. 5",
-                "The best result is obtained with the ground truth b_0.",
-                f"distance from the true b_0 of the one ({best[name]:.1f}) with the best {name}, "
-                "over the true one",
+            state(
+                "05.best",
                 abs(best[name] - PIXEL.brightness) / PIXEL.brightness,
-                at_most=0.02,
-                form="{:.1%}",
+                best=best[name],
+                name=name,
             )
             for name in errors
         ),
-        check(
-            "Fig. 5",
-            "Where the Toeplitz matrix is nearly singular the reconstruction is nearly sparse.",
-            f"share of the light within {_WINDOW_RAD} rad of Pisarenko's returns, smallest "
-            f"eigenvalue {_NEAR:.2%} of b_0",
-            _concentrated(b, phase, sparsest),
-            at_least=0.9,
-            form="{:.0%}",
-        ),
-        check(
-            "Sec. 4.3",
-            "The zeroth moment governs sparsity.",
-            "share of the steps of b_0 at which the highest peak gets lower",
-            float((np.diff(heights) < 0).mean()),
-            at_least=1.0,
-            form="{:.0%}",
-        ),
-        check(
-            "Fig. 5",
-            "In between it changes continuously.",
-            "change of the density by half of a small step of b_0, over that by the whole step",
-            float(moved[0] / moved[1]),
-            at_least=0.45,
-            at_most=0.55,
-            form="{:.3f}",
-        ),
+        state("05.sparse", _concentrated(b, phase, sparsest), window_rad=_WINDOW_RAD, near=_NEAR),
+        state("05.governs", float((np.diff(heights) < 0).mean())),
+        state("05.continuous", float(moved[0] / moved[1])),
     ]
 
 
@@ -187,10 +161,4 @@ def _draw(
     return picture
 
 
-FIGURE: Final = PaperFigure(
-    5,
-    "The zeroth moment governs sparsity",
-    "Synthetic: a pixel of three exponentially modified Gaussians with b_0 = 67.5, m = 5, without "
-    "noise. Its true b_1 to b_5 are reconstructed with different values of b_0.",
-    make,
-)
+FIGURE: Final = figure(5, make)

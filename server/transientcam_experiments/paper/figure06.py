@@ -7,7 +7,7 @@ import numpy as np
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_experiments.paper.mirrors import shots, thrice
 
 _SEQUENCE: Final = Sequence(harmonics=4, base_frequency_hz=23e6, takes=30)
@@ -77,31 +77,9 @@ def _statements(
     shares = np.array([weight[k][where].sum() for k in range(3)])
     true = np.array([_ranked_truth(shot)[1][k][where].sum() for k in range(3)])
     return [
-        check(
-            "Fig. 6",
-            "The different light paths through the mirrors are separated clearly.",
-            f"share of pixels with three returns where each of the three strongest is found within "
-            f"{_NEAR_S * 1e9:g} ns",
-            float(near[where].mean()),
-            at_least=0.9,
-            form="{:.1%}",
-        ),
-        check(
-            "Fig. 6",
-            "Phase noise increases as the strength of the return weakens.",
-            "deviation of the time between two captures, each rank over the stronger one, the "
-            "least",
-            min(noise[1] / noise[0], noise[2] / noise[1]),
-            at_least=1.0,
-        ),
-        check(
-            "Sec. 5.1",
-            "The data directly provide insight into the strength of returns.",
-            "worst error of the light in each rank, over the true one",
-            float(np.abs(shares / true - 1).max()),
-            at_most=0.1,
-            form="{:.1%}",
-        ),
+        state("06.separated", float(near[where].mean()), near_ns=_NEAR_S * 1e9),
+        state("06.weaker", min(noise[1] / noise[0], noise[2] / noise[1])),
+        state("06.strengths", float(np.abs(shares / true - 1).max())),
     ]
 
 
@@ -142,10 +120,4 @@ def _draw(time_s: Array, weight: Array) -> Any:
     return picture
 
 
-FIGURE: Final = PaperFigure(
-    6,
-    "The three strongest returns",
-    "The scene `mirrors`, m = 4, f = 23 MHz, 30 takes: strength and time of flight of the three "
-    "strongest returns of the Pisarenko estimate. White: no such return.",
-    make,
-)
+FIGURE: Final = figure(6, make)

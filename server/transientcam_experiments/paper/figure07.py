@@ -8,7 +8,7 @@ import numpy as np
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_experiments.paper.synthetic import CONTINUOUS, Response
 
 _M: Final = 5
@@ -146,58 +146,24 @@ def _statements(
     slack = 1e-6  # of the density's wrapped tail
     of_five = {m: greatest for m, _, greatest in widths}[_M]
     return [
-        check(
-            "Fig. 7",
-            "The ground truth is known to lie within the bounds after smoothing.",
-            "how far the smoothed truth leaves them, over the highest bound",
-            _outside(truth[None], lower, upper),
-            at_most=slack,
-            form="{:.1e}",
-        ),
-        check(
-            "Sec. 5.2",
-            "The same holds for our reconstruction.",
-            "how far the smoothed maximum entropy estimate leaves them, over the highest bound",
-            _outside(smoothed[1:2], lower, upper),
-            at_most=slack,
-            form="{:.1e}",
-        ),
-        check(
-            "Fig. 7",
-            "Any density compatible with the moments is known to lie within these bounds.",
-            f"how far {len(smoothed) - 2} other measures with the same moments leave them, over "
-            "the highest bound",
+        state("07.truth", _outside(truth[None], lower, upper), at_most=slack),
+        state("07.ours", _outside(smoothed[1:2], lower, upper), at_most=slack),
+        state(
+            "07.others",
             _outside(smoothed[2:], lower, upper),
             at_most=slack,
-            form="{:.1e}",
+            others=len(smoothed) - 2,
         ),
-        check(
-            "Sec. 5.2",
-            "The bounds are sharp.",
-            "least distance that any of these measures keeps from a bound, over the highest bound",
-            float(np.minimum(smoothed - lower, upper - smoothed).min() / upper.max()),
-            at_most=1e-3,
-            form="{:.1e}",
+        state(
+            "07.sharp", float(np.minimum(smoothed - lower, upper - smoothed).min() / upper.max())
         ),
-        check(
-            "Sec. 5.2",
-            "If the ground truth is reasonably close to sparse this area is pleasantly small.",
-            "greatest distance of the bounds over the highest bound",
-            of_five,
-            at_most=0.25,
-            form="{:.0%}",
-            otherwise="our response is not as close to sparse as theirs may have been (the paper "
-            "does not print its parameters): the second table shows the area shrink as the returns "
-            "get narrower",
-        ),
-        check(
-            "Sec. 5.2",
-            "We can give specific bounds on possible locations of local maxima.",
-            "width of the interval in which a maximum must be, around the highest lower bound, "
-            f"over 2 π / m (the true one, at {float(phase[truth.argmax()]):.2f} rad, is in "
-            f"[{begin:.2f}, {end:.2f}])",
+        state("07.small", of_five),
+        state(
+            "07.maxima",
             (end - begin) / (2 * np.pi / _M),
-            at_most=0.5,
+            true_rad=float(phase[truth.argmax()]),
+            begin=begin,
+            end=end,
         ),
     ]
 
@@ -239,11 +205,4 @@ def _draw(b: Array, phase: Array, lower: Array, upper: Array, smoothed: Array) -
     return picture
 
 
-FIGURE: Final = PaperFigure(
-    7,
-    "Error bounds on smoothed densities",
-    "Synthetic: the three exponentially modified Gaussians of Figure 11b, m = 5, f = 23 MHz, "
-    "without noise, r = 0.93 as in the paper. Other measures with the same moments are made by "
-    "taking a return from anywhere and explaining the rest by Pisarenko's estimate.",
-    make,
-)
+FIGURE: Final = figure(7, make)

@@ -7,7 +7,7 @@ import numpy as np
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench, Options, ReconstructedShot
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
     SINGLE_TAKE,
@@ -191,94 +191,16 @@ def _statements(captures: dict[str, list[ReconstructedShot]]) -> list[Statement]
         for name, hz in _RATES_HZ.items()
     )
     return [
-        check(
-            "Fig. 8",
-            "The capture rates are 11 Hz, 0.44 Hz and 0.12 Hz.",
-            "worst difference of the rate that follows from the time of a capture",
-            rate,
-            at_most=0.05,
-            form="{:.1%}",
-        ),
-        check(
-            "Sec. 6.1",
-            "With m = 3 and a single take we already successfully separate the three returns.",
-            "share of pixels with three returns where the density peaks within 1 ns of each",
-            _separated(first["a"]),
-            at_least=0.9,
-            form="{:.1%}",
-        ),
-        check(
-            "Sec. 6.1",
-            "Additional frequency measurements yield sharper peaks (m = 4 against m = 3).",
-            "typical height of the highest peak over brightness, over that at m = 3",
-            heights["b"] / heights["a"],
-            at_least=1.0,
-        ),
-        check(
-            "Sec. 6.1",
-            "Using m = 8 leads to a reconstruction with sharp peaks.",
-            "the same, m = 8 at 11.5 MHz over m = 3 at 23 MHz",
-            heights["c"] / heights["a"],
-            at_least=1.0,
-        ),
-        check(
-            "Sec. 6.1",
-            "At m = 4 some visible artefacts remain; m = 8 further reduces these.",
-            "share of the light of the three frames in pixels where none is within 1 ns, (c) over "
-            "(b)",
-            _stray(first["c"]) / _stray(first["b"]),
-            at_most=1.0,
-            otherwise="with twice the period in time a peak of the same width in phase is twice as "
-            "wide in time, and what it leaves beside the wave is more than what m = 8 saves",
-        ),
-        check(
-            "Sec. 6.1",
-            "At m = 8 biasing is mandatory for 90 % of all pixels.",
-            f"share of lit pixels that would be biased, (c), {ROOM:.0%} of the light diffuse",
-            biased["c"],
-            at_least=0.85,
-            at_most=0.95,
-            form="{:.1%}",
-            otherwise="diffuse light does not explain it: eight frequencies resolve the returns so "
-            "far that the smallest eigenvalue is that of the errors, of harmonics that phase steps "
-            "leave and of the zeroth moment, whatever little light is between them (second and "
-            "third table)",
-        ),
-        check(
-            "Sec. 6",
-            "Biasing only affects few pixels unless otherwise noted (so at m = 3, (a)).",
-            f"share of lit pixels that would be biased, (a), {ROOM:.0%} of the light diffuse; "
-            f"without any it is {_share(first['a']):.0%}",
-            biased["a"],
-            at_most=0.2,
-            form="{:.1%}",
-        ),
-        check(
-            "Sec. 6.1",
-            "Averaging leads to a result with substantially less noise (Fig. 1 against 8b).",
-            f"typical difference of two captures at m = 4, one take over {takes}",
-            noise["1"] / noise["b"],
-            at_least=2.0,
-            form="{:.1f}",
-        ),
-        check(
-            "Sec. 6.1",
-            "In spite of the single take, 8a appears less noisy than Fig. 1.",
-            "typical difference of two single takes, m = 3 over m = 4",
-            noise["a"] / noise["1"],
-            at_most=1.0,
-            otherwise="measured pixel by pixel and relative to the density, the noise of a peak's "
-            "height and place weighs as much at m = 3",
-        ),
-        check(
-            "Sec. 6.1, 6.4",
-            "The number two is slightly visible in Fig. 8a for 11.3 ns.",
-            "density over direct light at 11.3 ns in the shadow of the 2, over that beside it, "
-            "less 1",
-            abs(_shadow_of_two(first["a"]) - 1),
-            at_least=0.05,
-            form="{:.0%}",
-        ),
+        state("08.rates", rate),
+        state("08.separated", _separated(first["a"])),
+        state("08.m4_sharper", heights["b"] / heights["a"]),
+        state("08.m8_sharper", heights["c"] / heights["a"]),
+        state("08.artefacts", _stray(first["c"]) / _stray(first["b"])),
+        state("08.m8_biased", biased["c"], room=ROOM),
+        state("08.m3_biased", biased["a"], room=ROOM, share=_share(first["a"])),
+        state("08.averaging", noise["1"] / noise["b"], takes=takes),
+        state("08.single_take", noise["a"] / noise["1"]),
+        state("08.shadow", abs(_shadow_of_two(first["a"]) - 1)),
     ]
 
 
@@ -336,11 +258,4 @@ def _draw(first: dict[str, ReconstructedShot]) -> Any:
     return picture
 
 
-FIGURE: Final = PaperFigure(
-    8,
-    "Frames of a transient image at three prices",
-    "The scene `mirrors`: density at three times of flight, maximum entropy, each frame on a scale "
-    "of its own. Exposure 1.92 ms; the shadows of the digits 1, 2 and 3 tell the three returns "
-    "apart.",
-    make,
-)
+FIGURE: Final = figure(8, make)

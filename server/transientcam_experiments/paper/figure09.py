@@ -7,7 +7,7 @@ import numpy as np
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
     TIMES_S,
@@ -95,49 +95,14 @@ def _statements(
     worst = {name: float(np.percentile(np.abs(each.waves), 95)) for name, each in errors.items()}
     front = {name: float(np.median(np.abs(each.fronts))) for name, each in errors.items()}
     return [
-        check(
-            "Sec. 6.1",
-            "The total brightness contributed by the waves is always reconstructed correctly.",
-            "error of the light between the waves and after the last, over the brightness, median "
-            "of the pixels with three returns; the worst of (a), (b) and (c)",
-            max(typical.values()),
-            at_most=0.03,
-            form="{:.1%}",
-        ),
-        check(
-            "Sec. 6.1",
-            "Always: also in the 95th percentile of these pixels and times.",
-            "the same, 95th percentile",
-            max(worst.values()),
-            at_most=0.1,
-            form="{:.1%}",
-            otherwise="with m = 3 and one take a broad peak has tails under the next wave",
-        ),
-        check(
-            "Sec. 6.1",
-            "Uncertainty translates to smeared out or misshaped wave fronts.",
-            f"error {_FRONT_S * 1e9:g} ns before each return in (a), over the error between waves",
-            front["a"] / typical["a"],
-            at_least=1.0,
-            form="{:.1f}",
-        ),
-        check(
-            "Sec. 6.4",
-            "The cumulative density within peaks is quite robust to noise.",
-            "typical difference of two single-take captures behind the first wave, over that of "
-            "the density in it",
+        state("09.total", max(typical.values())),
+        state("09.always", max(worst.values())),
+        state("09.fronts", front["a"] / typical["a"], front_ns=_FRONT_S * 1e9),
+        state(
+            "09.robust",
             _noise(captures["a"], cumulative=True) / _noise(captures["a"], cumulative=False),
-            at_most=0.2,
-            form="{:.3f}",
         ),
-        check(
-            "Sec. 6.1",
-            "We compute cumulative images by numerical quadrature with 1e5 equidistant samples.",
-            "worst distance of our closed form from that quadrature in (b), over the brightness",
-            _quadrature_error(captures["b"][0]),
-            at_most=1e-3,
-            form="{:.1e}",
-        ),
+        state("09.quadrature", _quadrature_error(captures["b"][0])),
     ]
 
 
@@ -172,9 +137,4 @@ def _draw(first: dict[str, ReconstructedShot]) -> Any:
     return picture
 
 
-FIGURE: Final = PaperFigure(
-    9,
-    "Frames of the cumulative transient image",
-    "The captures of Figure 8, integrated up to three times of flight in closed form.",
-    make,
-)
+FIGURE: Final = figure(9, make)

@@ -8,7 +8,7 @@ import numpy as np
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench, Options, ReconstructedShot
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, parts, video
 
 _OUTLIER: Final = 0.2
@@ -76,52 +76,17 @@ def _statements(shots: list[ReconstructedShot], daylight: ReconstructedShot) -> 
     lit = daylight.lit
     change = daylight.found.brightness[lit].sum() / shots[0].found.brightness[lit].sum() - 1
     return [
-        check(
-            "Fig. 14",
-            "The lighting due to the mirrors is separated from direct illumination.",
-            "median error of the indirect light over the brightness, pixels with light over both "
-            "mirrors",
-            float(np.nanmedian(wrong)),
-            at_most=0.05,
-            form="{:.1%}",
-        ),
-        check(
-            "Sec. 6.3",
-            "The indirect component exhibits a few outliers.",
-            f"share of lit pixels where more than {_OUTLIER:.0%} of the light is on the wrong side",
+        state("14.separated", float(np.nanmedian(wrong))),
+        state(
+            "14.outliers",
             outliers,
-            at_least=0.001,
-            at_most=0.1,
-            form="{:.1%}",
-            otherwise="at 0.5 ms noise splits a return in two in some pixels, and those of the "
-            "actor see different depths from image to image while it walks: where it stands still "
-            f"(t = {MOMENTS_S[1]:g} s) it is {_outliers(shots[1]):.1%}",
+            outlier=_OUTLIER,
+            at_s=MOMENTS_S[1],
+            standing=_outliers(shots[1]),
         ),
-        check(
-            "Sec. 6.3",
-            "The time of flight for the direct return is free of multipath interference.",
-            "median error of the time in pixels with light over both mirrors, over that of a "
-            "single frequency",
-            float(np.nanmedian(ours) / np.nanmedian(single)),
-            at_most=0.1,
-            form="{:.3f}",
-        ),
-        check(
-            "Sec. 6.3",
-            "The sum of both is the zeroth moment, computed from three frequencies (Sec. 4.3).",
-            "median error of the estimated brightness over the true one",
-            float(np.nanmedian(brightness)),
-            at_most=0.05,
-            form="{:.1%}",
-        ),
-        check(
-            "Sec. 6.3",
-            "This is a method to compute images that include solely active illumination.",
-            "change of the whole image's brightness by ambient light of a tenth of a full well",
-            float(abs(change)),
-            at_most=0.02,
-            form="{:.2%}",
-        ),
+        state("14.free", float(np.nanmedian(ours) / np.nanmedian(single))),
+        state("14.sum", float(np.nanmedian(brightness))),
+        state("14.active", float(abs(change))),
     ]
 
 
@@ -176,10 +141,4 @@ def _time_ns(shot: ReconstructedShot) -> Array:
     return time_ns
 
 
-FIGURE: Final = PaperFigure(
-    14,
-    "Direct and indirect light in a transient video",
-    "The frames of Figure 13, separated by the Pisarenko estimate: the first return with a tenth "
-    "of the strongest one's weight is direct.",
-    make,
-)
+FIGURE: Final = figure(14, make)

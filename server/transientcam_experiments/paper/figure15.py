@@ -10,7 +10,7 @@ import transientcam_moments as tm
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, Statement, Table, figure, state
 from transientcam_experiments.paper.mirrors import SEQUENCES, shots, thrice
 
 _TIMES_S: Final = np.linspace(9e-9, 31e-9, 881)
@@ -132,32 +132,9 @@ def _statements(
     weight, width = _widths_ns(shot, row, streak)
     weak, strong = width[weight < 0.2], width[weight > 0.5]
     return [
-        check(
-            "Fig. 15",
-            "Note the smoothed densities in regions of high uncertainty.",
-            "median width of peaks with less than a fifth of a pixel's light, over that of peaks "
-            "with more than half",
-            float(np.median(weak) / np.median(strong)),
-            at_least=1.2,
-            form="{:.1f}",
-        ),
-        check(
-            "Sec. 6.4",
-            "If two returns are temporally close, uncertainty can cause them to merge into one.",
-            f"share of pixels in which both of a pair {merging[0][0]:g} ns apart peak",
-            merging[0][1] / 100,
-            at_most=0.5,
-            form="{:.0%}",
-        ),
-        check(
-            "Sec. 5.3",
-            "The maximum entropy estimate can reconstruct distinct peaks (where they are far "
-            "apart).",
-            f"share of pixels in which both of a pair {merging[-1][0]:g} ns apart peak",
-            merging[-1][1] / 100,
-            at_least=0.95,
-            form="{:.0%}",
-        ),
+        state("15.smoothed", float(np.median(weak) / np.median(strong))),
+        state("15.merge", merging[0][1] / 100, apart_ns=merging[0][0]),
+        state("15.distinct", merging[-1][1] / 100, apart_ns=merging[-1][0]),
     ]
 
 
@@ -195,11 +172,4 @@ def _draw_streak(axes: Any, streak: Array, title: str) -> None:
     axes.grid(visible=False)
 
 
-FIGURE: Final = PaperFigure(
-    15,
-    "A streak image",
-    "(a) One scanline of the capture of Figures 8b and 9b (m = 4, f = 23 MHz, 20 takes) over time "
-    "of flight. (b) The same for a scene of two returns, 2 : 1, that are 0.05 ns further apart in "
-    "each column (dotted: where they are).",
-    make,
-)
+FIGURE: Final = figure(15, make)

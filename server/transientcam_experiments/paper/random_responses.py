@@ -12,7 +12,7 @@ import numpy as np
 
 from transientcam_experiments.paper.bench import Bench
 from transientcam_experiments.paper.contenders import CONTENDERS, PRINTED
-from transientcam_experiments.paper.figure import Statement, Table, check
+from transientcam_experiments.paper.figure import Statement, Table, state
 from transientcam_experiments.paper.outcome import Outcome, outcome
 from transientcam_experiments.paper.synthetic import Response, Return
 
@@ -26,27 +26,18 @@ _NAMES: Final = {"godbaz": "The Dirac-δ model", "spumic": "SPUMIC"}
 class Claim:
     """A sentence about a continuous response, and what to measure: of it, and of the sparse one."""
 
-    says: str
-    measure: str
+    key: str
+    """Of the sentence in ``figures.toml``."""
     value: Callable[[Response, _Outcomes, _Outcomes], float]
-    form: str
-    at_least: float | None = None
-    at_most: float | None = None
+    label: str = ""
+    """Of the technique that it is about, where there are several."""
 
     def statement(
         self, response: Response, found: _Outcomes, sparse: _Outcomes, *, otherwise: str = ""
     ) -> Statement:
         """Hold it against what techniques found."""
-        return check(
-            "Sec. 6.1",
-            self.says,
-            self.measure,
-            self.value(response, found, sparse),
-            at_least=self.at_least,
-            at_most=self.at_most,
-            form=self.form,
-            otherwise=otherwise,
-        )
+        value = self.value(response, found, sparse)
+        return state(self.key, value, otherwise=otherwise, label=self.label)
 
 
 def valleys_s(response: Response) -> list[float]:
@@ -86,71 +77,20 @@ CLAIMS: Final = (
         claim
         for name, label in _NAMES.items()
         for claim in (
-            Claim(
-                f"{label} only captures the first return adequately: the first.",
-                "error of the cumulative density after the first return, over b_0, without noise",
-                _first(name),
-                "{:.1%}",
-                at_most=0.1,
-            ),
-            Claim(
-                f"{label} only captures the first return adequately: not the rest.",
-                "worst error after the second and the third return, over b_0, without noise",
-                _rest(name),
-                "{:.1%}",
-                at_least=0.1,
-            ),
-            Claim(
-                f"{label} becomes even more sensitive to noise.",
-                "deviation between noisy draws, continuous over sparse case",
-                _sensitive(name),
-                "{:.2f}",
-                at_least=1.0,
-            ),
+            Claim("11.first", _first(name), label),
+            Claim("11.rest", _rest(name), label),
+            Claim("11.more_sensitive", _sensitive(name), label),
         )
     ),
+    Claim("11.sra_darker", lambda _, found, sparse: float(found["sra"].clean[-1])),
+    Claim("11.sra_third", _third),
+    Claim("11.sra_noise", lambda _, found, sparse: found["sra"].spread / found["pisarenko"].spread),
     Claim(
-        "SRA has a bias towards less overall brightness.",
-        "its brightness over the true one, without noise",
-        lambda _, found, sparse: float(found["sra"].clean[-1]),
-        "{:.1%}",
-        at_most=0.99,
-    ),
-    Claim(
-        "Therefore SRA loses the third return.",
-        "light that SRA has for the third return, over the true one",
-        _third,
-        "{:.0%}",
-        at_most=0.5,
-    ),
-    Claim(
-        "SRA successfully reduces the impact of noise (against Pisarenko).",
-        "deviation between noisy draws, SRA over Pisarenko",
-        lambda _, found, sparse: found["sra"].spread / found["pisarenko"].spread,
-        "{:.2f}",
-        at_most=1.0,
-    ),
-    Claim(
-        "The Pisarenko estimate provides a better reconstruction (than SRA).",
-        "mean error without noise, Pisarenko over SRA",
+        "11.pisarenko_better",
         lambda _, found, sparse: found["pisarenko"].clean_error / found["sra"].clean_error,
-        "{:.2f}",
-        at_most=1.0,
     ),
-    Claim(
-        "The maximum entropy estimate adequately reconstructs the continuous return.",
-        "mean error of the cumulative density over b_0, without noise",
-        lambda _, found, sparse: found["maximum-entropy"].clean_error,
-        "{:.1%}",
-        at_most=0.02,
-    ),
-    Claim(
-        "For the maximum entropy estimate noise mostly affects sharpness of the peaks.",
-        "deviation between draws in the valleys, over the mean over all times",
-        _in_valleys,
-        "{:.2f}",
-        at_most=1.0,
-    ),
+    Claim("11.entropy_adequate", lambda _, found, sparse: found["maximum-entropy"].clean_error),
+    Claim("11.entropy_noise", _in_valleys),
 )
 """What the paper says of the continuous case."""
 
@@ -206,7 +146,8 @@ def statements(
 def tables(others: _Study, sparse: _Outcomes) -> tuple[Table, Table]:
     """Return how often each claim holds, and each technique's mean errors."""
     rows: list[tuple[Any, ...]] = [
-        (claim.says, 100 * _share(claim, others, sparse)) for claim in CLAIMS
+        (claim.statement(*others[0], sparse).says, 100 * _share(claim, others, sparse))
+        for claim in CLAIMS
     ]
     labels = {each.name: each.label for each in CONTENDERS}
     errors = [
