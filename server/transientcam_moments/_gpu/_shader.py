@@ -5,6 +5,7 @@ traced from the functions that state it (`_tracing`). One thread does one pixel.
 """
 
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -28,60 +29,6 @@ PLANES: Final = (
 ZEROTH: Final = {"low-frequency": 4, "on-off": 2, "estimated": 0}
 NON_FINITE: Final = 8
 
-_HEAD = """
-struct Params {
-  width: u32, height: u32, radius: u32, stride: u32,
-  bad: u32, zero: u32, epsilon: f32, least: f32,
-  full_scale: f32, threshold: f32, metres: f32, nan: f32,
-}
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> raw: array<u32>;  // two u16 each, image after image
-@group(0) @binding(2) var<storage, read> inverse: array<vec2<f32>>;
-@group(0) @binding(3) var<storage, read> weights: array<f32>;  // of pixels, then taps
-@group(0) @binding(4) var<storage, read> places: array<u32>;  // of bad pixels in `replaced`, from 1
-@group(0) @binding(5) var<storage, read> replaced: array<vec2<f32>>;
-@group(0) @binding(6) var<storage, read_write> moments: array<vec2<f32>>;
-@group(0) @binding(7) var<storage, read_write> out: array<u32>;
-
-// A value as it was rounded: no compiler knows that `zero` is 0.
-fn rounded(x: f32) -> f32 { return bitcast<f32>(bitcast<u32>(x) ^ params.zero); }
-// 12 leading bits of a factor: products of such are exact.
-fn lost_by_squaring(x: f32, square: f32) -> f32 {
-  let high = bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
-  let low = rounded(x - high);
-  return (rounded(high * high - square) + 2.0 * high * low) + low * low;
-}
-// WGSL promises quotients and roots to 2.5 units and more: a step of Newton's makes it one.
-fn quotient(a: f32, b: f32) -> f32 {
-  let near = divide(1.0, b);
-  let y = near * (2.0 - b * near);
-  let q = a * y;
-  return q + y * (a - q * b);
-}
-fn root_of(x: f32) -> f32 {
-  let y = square_root(x);
-  return select(y, y + divide(0.5 * (x - y * y), y), y > 0.0);
-}
-fn finite(x: f32) -> bool { return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u; }
-fn image(i: u32, p: u32, pixels: u32) -> f32 {
-  let at = i * pixels + p;
-  let word = raw[at >> 1u];
-  return f32(select(word & 0xffffu, word >> 16u, (at & 1u) == 1u));
-}
-"""
-_PLAIN = """
-fn divide(a: f32, b: f32) -> f32 { return a / b; }
-fn square_root(x: f32) -> f32 { return sqrt(x); }
-"""
-_HOSTILE = """
-fn spoilt(x: f32) -> f32 {
-  let bits = bitcast<u32>(x);
-  if (!finite(x) || (bits & 0x7f800000u) < 0x01000000u) { return x; }
-  return bitcast<f32>(bits + ((bits * 2654435761u) >> 16u) % 5u - 2u);
-}
-fn divide(a: f32, b: f32) -> f32 { return spoilt(a / b); }
-fn square_root(x: f32) -> f32 { return spoilt(sqrt(x)); }
-"""
 ENTRY = f"""
 @compute @workgroup_size({GROUP})
 fn %s(@builtin(global_invocation_id) id: vec3<u32>) {{
@@ -95,7 +42,9 @@ fn %s(@builtin(global_invocation_id) id: vec3<u32>) {{
 
 def head(*, hostile: bool) -> str:
     """Return what all shaders begin with: bindings, and words that stand for no operator."""
-    return _HEAD + (_HOSTILE if hostile else _PLAIN)
+    names = "head", "hostile" if hostile else "plain"
+    files = (Path(__file__).with_name(f"{name}.wgsl") for name in names)
+    return "".join(file.read_text("utf-8") for file in files)
 
 
 @lru_cache(maxsize=32)
