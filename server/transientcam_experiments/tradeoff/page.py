@@ -4,6 +4,7 @@ import html
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from string import Template
 from typing import Any, Final
 
 from transientcam_experiments.tradeoff import capture, computing, estimating, transport
@@ -23,56 +24,6 @@ _TITLES: Final = {
     "transport": "Transport",
 }
 
-_STYLE: Final = """
-:root { color-scheme: light dark; font: 15px/1.45 system-ui, sans-serif; }
-body { max-width: 78rem; margin: 2rem auto; padding: 0 1rem; }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(27rem, 1fr)); gap: 1rem; }
-.plots svg { width: 100%; height: auto; background: #fff; border-radius: .4rem; }
-.plots g[id^="p"] { cursor: pointer; }
-.table { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .6rem; text-align: right; white-space: nowrap; }
-th, td { border-bottom: 1px solid #8884; }
-th:first-child, td:first-child { text-align: left; }
-tr.chosen { background: #fd04; }
-small { opacity: .7; }
-button { font: inherit; }
-dt { font-weight: 600; font-family: ui-monospace, monospace; }
-#copied { position: fixed; bottom: 1rem; right: 1rem; padding: .4rem .8rem; border-radius: .4rem;
-  background: #174; color: #fff; }
-"""
-
-_SCRIPT: Final = """
-const copied = document.getElementById('copied');
-async function copy(row) {
-  const text = row.dataset.sequence;
-  try {
-    await navigator.clipboard.writeText(text);
-  } catch {
-    const area = document.body.appendChild(document.createElement('textarea'));
-    area.value = text;
-    area.select();
-    document.execCommand('copy');
-    area.remove();
-  }
-  copied.hidden = false;
-  setTimeout(() => { copied.hidden = true; }, 1500);
-}
-function choose(id) {
-  for (const row of document.querySelectorAll('tr.chosen')) row.classList.remove('chosen');
-  const row = document.getElementById('row-' + id);
-  if (!row) return;
-  row.classList.add('chosen');
-  row.scrollIntoView({ block: 'center', behavior: 'smooth' });
-}
-document.addEventListener('click', (event) => {
-  const button = event.target.closest('button.copy');
-  if (button) copy(button.closest('tr'));
-  const point = event.target.closest('.plots g[data-point]');
-  if (point) choose(point.dataset.point);
-});
-"""
-
 
 def page(records: Iterable[Record], plots: Mapping[tuple[str, str], bytes]) -> str:
     """Return the page.
@@ -81,25 +32,12 @@ def page(records: Iterable[Record], plots: Mapping[tuple[str, str], bytes]) -> s
     ``plots``: SVG by scene and name of the plot.
     """
     results = list(records)
-    scenes = list(dict.fromkeys(record.scene for record in results))
-    parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8>",
-        "<meta name=viewport content='width=device-width'>",
-        f"<title>What accuracy costs</title><style>{_STYLE}</style>",
-        "<h1>What accuracy costs</h1>",
-        "<p>Each point is one setting, measured on a simulated scene whose truth is known; the "
-        "grey line joins those that no other beats in both. Click a point to find it in the "
-        "table. <b>Copy</b> puts its sequence on the clipboard, ready for "
-        "<code>PUT /api/v1/sequence</code>. Small figures are the spread over the repetitions.",
-    ]
-    for scene in scenes:
+    sections = []
+    for scene in dict.fromkeys(record.scene for record in results):
         of_scene = [record for record in results if record.scene == scene]
-        parts += [f"<h2>{html.escape(scene)}</h2>", *_section(scene, of_scene, plots)]
-    parts += [
-        "<div id=copied role=status hidden>Copied</div>",
-        f"<script>{_SCRIPT}</script></html>",
-    ]
-    return "\n".join(parts)
+        sections += [f"<h2>{html.escape(scene)}</h2>", *_section(scene, of_scene, plots)]
+    template = Path(__file__).with_suffix(".html").read_text("utf-8").rstrip("\n")
+    return Template(template).substitute(sections="\n".join(sections))
 
 
 def _section(

@@ -1,8 +1,10 @@
 """Pareto plots of what was measured; needs the extra ``plot``."""
 
+import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
+from pathlib import Path
 from typing import Any, Final
 
 from transientcam_experiments.tradeoff.records import Record
@@ -20,7 +22,7 @@ class Axes:
     error: str
     error_label: str
     colour: str
-    only: Mapping[str, Any]
+    only: Mapping[str, Any] = field(default_factory=dict)
 
     def shows(self, record: Record) -> bool:
         """Whether a result belongs to this plot and has both of its quantities."""
@@ -39,49 +41,14 @@ _COSTS: Final = {
 }
 
 
-def _axes(kind: str, title: str, error: str, error_label: str, **only: str) -> Axes:
+def _axes(kind: str, **stated: Any) -> Axes:
     cost, cost_label, colour = _COSTS[kind]
-    return Axes(kind, title, cost, cost_label, error, error_label, colour, only)
+    return Axes(kind=kind, cost=cost, cost_label=cost_label, colour=colour, **stated)
 
 
 PLOTS: Final = {
-    "repeatability": _axes(
-        "capture",
-        "Capture time: noise of range",
-        "range_std_m",
-        "standard deviation of a typical pixel / m",
-    ),
-    "range": _axes("capture", "Capture time: error of range", "range_rmse_m", "RMSE / m"),
-    "median": _axes(
-        "capture", "Capture time: error of a typical range", "range_median_m", "median error / m"
-    ),
-    "cumulative": _axes(
-        "capture", "Capture time: cumulative density", "cumulative_mean", "mean error / brightness"
-    ),
-    "bounds": _axes(
-        "capture", "Capture time: bounds on the density", "bound_width", "width / mean density"
-    ),
-    "computing": _axes(
-        "computing",
-        "Computing time: cumulative density",
-        "error_worst",
-        "worst error / brightness",
-        task="cumulative",
-    ),
-    "density": _axes(
-        "computing", "Computing time: density", "error_worst", "worst error / peak", task="density"
-    ),
-    "estimating": _axes("estimating", "Estimators of range", "range_median_m", "median error / m"),
-    "transport": _axes(
-        "transport",
-        "Transport: density",
-        "error_median",
-        "added error / brightness",
-        product="coefficients",
-    ),
-    "transport-range": _axes(
-        "transport", "Transport: range", "error_worst", "worst added error / m", product="range"
-    ),
+    name: _axes(**each)
+    for name, each in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()
 }
 """Every plot by the name of its file."""
 
