@@ -13,41 +13,13 @@ import {
   type WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
+import fragment from "./eyeDome.frag?raw";
 
 /** How far away neighbours are, in CSS px, and how dark a step of twice the distance makes. */
 const REACH_PX = 1.5;
 const STRENGTH = 4;
 
 const VERTEX = "void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }";
-
-const FRAGMENT = `
-uniform sampler2D colours;
-uniform sampler2D depths;
-uniform float near;
-uniform float far;
-uniform int reach;
-
-float depthAt(ivec2 at) {
-  return texelFetch(depths, clamp(at, ivec2(0), textureSize(depths, 0) - 1), 0).r;
-}
-
-float logarithm(float depth) {
-  return log2(near * far / (far - depth * (far - near)));
-}
-
-void main() {
-  ivec2 at = ivec2(gl_FragCoord.xy);
-  gl_FragColor = texelFetch(colours, at, 0);
-  float depth = depthAt(at);
-  if (depth >= 1.0) return;  // nothing is there
-  float own = logarithm(depth);
-  float behind = 0.0;
-  for (int step = -1; step <= 1; step += 2) {
-    behind += max(0.0, own - logarithm(depthAt(at + ivec2(step * reach, 0))));
-    behind += max(0.0, own - logarithm(depthAt(at + ivec2(0, step * reach))));
-  }
-  gl_FragColor.rgb *= exp(-${STRENGTH.toFixed(1)} * behind / 4.0);
-}`;
 
 export class EyeDome {
   readonly #target = new WebGLRenderTarget(1, 1, {
@@ -57,7 +29,8 @@ export class EyeDome {
   });
   readonly #material = new ShaderMaterial({
     vertexShader: VERTEX,
-    fragmentShader: FRAGMENT,
+    fragmentShader: fragment,
+    defines: { STRENGTH: STRENGTH.toFixed(1) },
     blending: NoBlending,
     depthTest: false,
     depthWrite: false,
