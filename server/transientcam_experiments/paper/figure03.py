@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import copyfile
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
@@ -23,15 +24,7 @@ _THIRD: Final = 0.111
 _HIGHEST: Final = 9
 """Of the harmonics that the simulated device takes of a waveform."""
 _SHOWN: Final = (("none", 1), ("arccos", 8), ("harmonic-cancellation", 3))
-_SCENE: Final = """\
-name = "delays"
-[light]
-electrons_per_s = 1.0e7
-[[response]]
-file = "delays.npz"
-[device]
-waveform_file = "waveform.npy"
-"""
+_SCENE: Final = Path(__file__).with_name("delays.toml")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +107,7 @@ def _write(folder: Path, wave: Array) -> Path:
     np.savez(folder / "delays.npz", h=h, start_opl_m=0.0, bin_opl_m=bin_opl_m)
     np.save(folder / "waveform.npy", wave[None])
     scene = folder / "delays.toml"
-    scene.write_text(_SCENE, encoding="utf-8")
+    copyfile(_SCENE, scene)
     return scene
 
 

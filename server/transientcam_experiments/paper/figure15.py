@@ -1,6 +1,7 @@
 """Figure 15: a streak image, one scanline over time of flight (Sec. 6.4)."""
 
 from pathlib import Path
+from shutil import copyfile
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
@@ -20,13 +21,7 @@ _FIRST_S: Final = 12e-9
 _APART_S: Final = 0.05e-9
 """By how much returns of a pair are further apart from one column to the next."""
 _TRIED: Final = (5, 10, 15, 20, 25, 30, 40, 60, 80, 120, 160)
-_SCENE: Final = """\
-name = "pairs"
-[light]
-electrons_per_s = 1.0e7
-[[response]]
-file = "pairs.npz"
-"""
+_SCENE: Final = Path(__file__).with_name("pairs.toml")
 
 
 def make(bench: Bench) -> FigureResult:
@@ -108,7 +103,7 @@ def _pairs(bench: Bench) -> ReconstructedShot:
             bin_opl_m=_APART_S * SPEED_OF_LIGHT_M_S,
         )
         scene = Path(folder) / "pairs.toml"
-        scene.write_text(_SCENE, encoding="utf-8")
+        copyfile(_SCENE, scene)
         return bench.shot(str(scene), SEQUENCES["b"])
 
 
