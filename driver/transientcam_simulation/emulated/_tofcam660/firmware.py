@@ -62,6 +62,10 @@ _CONSTANT: Final[dict[int, bytes]] = {
 _Words = NDArray[np.uint16]
 
 
+class _Refused(Exception):  # noqa: N818  (an answer of the device, not a failure)
+    """A command is unknown, or asks for what is not possible."""
+
+
 @dataclass
 class EmulatedFirmware:
     """Settings and what they make of the light.
@@ -116,58 +120,50 @@ class EmulatedFirmware:
             return _done(), None
         if command in _CONSTANT:
             return _CONSTANT[command], None
-        handler = self._handlers.get(command)
         try:
-            answer = None if handler is None else handler(data)
-        except (struct.error, IndexError):  # a request that is too short
-            answer = None
-        return answer or pack_answer(AnswerType.NOT_ACKNOWLEDGED), None
+            if command not in self._handlers:
+                raise _Refused
+            return self._handlers[command](data) or _done(), None
+        except (_Refused, struct.error, IndexError):  # the latter of a request that is too short
+            return pack_answer(AnswerType.NOT_ACKNOWLEDGED), None
 
     # --- settings ----------------------------------------------------------------------------
 
-    def _set_region(self, data: bytes) -> bytes | None:
+    def _set_region(self, data: bytes) -> None:
         wanted = Region(*struct.unpack_from("!4H", data))
         if not wanted.possible:
-            return None
+            raise _Refused
         self.region = wanted
-        return _done()
 
-    def _set_integration_times(self, data: bytes) -> bytes:
+    def _set_integration_times(self, data: bytes) -> None:
         low, mid, high, grayscale = struct.unpack_from("!4H", data)
         self.integration_us = (low, mid, high, grayscale)
         self.pixels.expose_for(max(1, low) * 1e-6)
-        return _done()
 
-    def _set_minimum_amplitude(self, data: bytes) -> bytes:
+    def _set_minimum_amplitude(self, data: bytes) -> None:
         (self.minimum_amplitude,) = struct.unpack_from("!H", data)
-        return _done()
 
-    def _set_preset(self, data: bytes) -> bytes | None:
+    def _set_preset(self, data: bytes) -> None:
         if data[0] not in PRESETS_HZ:
-            return None
+            raise _Refused
         self.frequency_hz = PRESETS_HZ[data[0]]
-        return _done()
 
-    def _set_free_frequency(self, data: bytes) -> bytes | None:
+    def _set_free_frequency(self, data: bytes) -> None:
         (frequency_hz,) = struct.unpack_from("!I", data)
         if not MIN_FREQUENCY_HZ <= frequency_hz <= MAX_FREQUENCY_HZ:
-            return None
+            raise _Refused
         self.frequency_hz = float(frequency_hz)
         # now, since this may take seconds, and no image is awaited yet
         self.pixels.prepare(self.frequency_hz, max(1, self.integration_us[0]) * 1e-6)
-        return _done()
 
-    def _write_register(self, data: bytes) -> bytes:
+    def _write_register(self, data: bytes) -> None:
         self.registers[data[0]] = data[1]
-        return _done()
 
-    def _set_data_protocol(self, data: bytes) -> bytes:
+    def _set_data_protocol(self, data: bytes) -> None:
         self.over_tcp = bool(data[0])
-        return _done()
 
-    def _set_data_address(self, data: bytes) -> bytes:
+    def _set_data_address(self, data: bytes) -> None:
         self.data_address = ".".join(map(str, data[:4]))
-        return _done()
 
     # --- answers -----------------------------------------------------------------------------
 
