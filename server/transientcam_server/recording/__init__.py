@@ -24,7 +24,6 @@ from transientcam_server.recording._product_stores import (
     EVERY_CHUNK,
     FORMAT,
     METADATA,
-    ProductStore,
     ProductStores,
 )
 from transientcam_server.recording._reader import Recording
