@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 import pytest
 
-from transientcam_experiments.paper.figure import Table, check
+from transientcam_experiments.paper.figure import Table, check, state
 
 
 @pytest.mark.parametrize(
@@ -35,6 +35,15 @@ def test_a_statement_shows_its_value_as_its_limits() -> None:
     statement = check("Sec. 1", "says", "measure", 0.123, at_least=0.1, at_most=0.2, form="{:.0%}")
 
     assert (statement.shown, statement.criterion) == ("12%", "at least 10% and at most 20%")
+
+
+def test_a_sentence_of_the_file_is_filled_in_and_its_limits_can_be_replaced() -> None:
+    stated = state("08.averaging", 3.0, takes=7)
+    replaced = state("08.averaging", 3.0, takes=7, at_least=4.0)
+
+    assert stated.measure == "typical difference of two captures at m = 4, one take over 7"
+    assert (stated.criterion, stated.passes) == ("at least 2.0", True)
+    assert (replaced.criterion, replaced.passes) == ("at least 4.0", False)
 
 
 def test_documents_hold_plain_values_for_json() -> None:
