@@ -231,11 +231,12 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         first = neighbours.REACH * (row + 1)
         length = 2 * first + height * row + LEAST_PIXELS
 
-        def room(planes: int) -> tuple[Any, Any]:
-            """Return flat planes, and the view of them that is the picture."""
-            flat = np.zeros((planes, length), np.float32)
-            picture = flat[:, first : first + height * row].reshape(-1, height, row)
-            return flat, picture[..., :width]
+        def room(planes: int) -> Any:
+            return np.zeros((planes, length), np.float32)
+
+        def picture(flat: Any) -> Any:
+            """Return the view of flat planes that is the picture."""
+            return flat[..., first : first + height * row].reshape(-1, height, row)[..., :width]
 
         def over_rows(run: Callable[..., Any], *given: Any) -> None:
             def part(top: int, end: int) -> None:
@@ -244,16 +245,18 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             spread(part, height, _ROWS)
 
         planes, orders = 2 * len(raw), np.array(multiples, np.float32)
-        own, view = room(planes)
-        view[0::2], view[1::2] = raw.real, raw.imag
-        weights, view = room(len(raw))
-        view[...] = weight
-        (there,), view = room(1)
-        view[0] = present
-        given = own * there
-        (other, pictures), (spare, _) = room(planes), room(planes)
-        (share, left, late, known), others = room(4)
+        own, other, spare, weights = room(planes), room(planes), room(planes), room(len(raw))
+        there, share, left, late, known = room(5)
         share[:], left[:], current = 1, 1, own
+
+        def take_in(top: int, end: int) -> None:
+            rows, view = np.s_[:, top:end], picture(own)
+            view[0::2][rows], view[1::2][rows] = raw.real[rows], raw.imag[rows]
+            picture(weights)[rows], picture(there)[0, top:end] = weight[rows], present[top:end]
+
+        spread(take_in, height, _ROWS)
+        whole = ((present == 0) | (present == 1)).all()  # frames, and 0 elsewhere
+        given = own if whole else own * there
         for radius_px in neighbours.RADII_PX:
             near = neighbours.neighbourhood(radius_px)
             ahead = np.array([dy * row + dx for dy, dx, _ in near])
@@ -268,9 +271,14 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         rest = weights, there, share, beside, misfit
         over_rows(join, own, current, *rest, other, left, late, known)
         over_rows(take_back, other, left, late, known, lines, current, share)
-        moments = np.empty(raw.shape, np.complex64)
-        final = current[:, first : first + height * row].reshape(-1, height, row)[..., :width]
-        moments.real, moments.imag = final[0::2], final[1::2]
-        return moments, np.ascontiguousarray(share[first:][: height * row].reshape(height, row)[:, :width])
+        moments, final = np.empty(raw.shape, np.complex64), np.empty((height, width), np.float32)
+
+        def give_out(top: int, end: int) -> None:
+            rows, view = np.s_[:, top:end], picture(current)
+            moments.real[rows], moments.imag[rows] = view[0::2][rows], view[1::2][rows]
+            final[top:end] = picture(share)[0, top:end]
+
+        spread(give_out, height, _ROWS)
+        return moments, final
 
     return kernel
