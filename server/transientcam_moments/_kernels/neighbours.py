@@ -12,171 +12,110 @@ from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.arrays import Complexes, Places, RealPlane, RealPlanes, Reals
 from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.portable import bank, larger, select, smaller, some, tiny
-from transientcam_moments.arrays import Length, Plane
+from transientcam_moments.arrays import Length
 from transientcam_moments.noise import neighbours
 
 _ROWS = 8  # of a part at least
 
 
-@njit(forceinline=True, error_model="numpy")
-def _agreement(place: float, doubt: Plane) -> Any:
-    return place * smaller(larger(2.0 - doubt, 0.0 * doubt), 0.0 * doubt + 1.0)
-
-
-@njit(forceinline=True, error_model="numpy")
-def _weighed(plane: RealPlane, a: int, weight: Plane, c: int) -> Any:
-    return weight * (simd.load(weight, plane, a) + simd.load(weight, plane, c))
-
-
 @njit(nogil=True, error_model="numpy")
 def _round(
-    order: Length, multiples: RealPlane, given: RealPlanes, current: RealPlanes, weight: RealPlanes,
+    parts: Length, turns: RealPlane, given: RealPlanes, current: RealPlanes, weight: RealPlanes,
     present: RealPlane, share: RealPlane, ahead: Places, places: RealPlane, misfit: float, shift:
     float, following: RealPlanes, left: RealPlane, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write averages over one neighbourhood, and what they leave of the variance.
 
     Pictures lie flat with a margin between rows; planes of moments hold real and imaginary parts,
-    those given times the frames they are the mean of.
+    those given times the frames they are the mean of. Where all light comes later by one, a part
+    changes by ``turns`` times the other one.
     """
     one = simd.ones(present, 1)
-    size = len(order) + 1
-    er, ei, w = bank(one, order, 1), bank(one, order, 1), bank(one, order, 1)
-    tr, ti = bank(one, order, 1), bank(one, order, 1)
-    mr, mi = bank(one, order, 1), bank(one, order, 1)
+    size = len(parts) + 1
+    own, w, late = bank(one, parts, 1), bank(one, parts, 1), bank(one, parts, 1)
+    mean = bank(one, parts, 1)
     for p in range(start, stop, simd.width(one)):
-        norm = 0.0 * one
-        there = simd.load(one, present, p)
+        norm, there = 0.0 * one, simd.load(one, present, p)
         for j in range(size):
-            er[j], ei[j] = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
-            mr[j], mi[j] = simd.load(one, given[2 * j], p), simd.load(one, given[2 * j + 1], p)
-            w[j] = simd.load(one, weight[j], p)
-            tr[j], ti[j] = multiples[j] * w[j] * er[j], multiples[j] * w[j] * ei[j]
-            norm = norm + multiples[j] * tr[j] * er[j]
-            norm = norm + multiples[j] * ti[j] * ei[j]
+            own[j], mean[j] = simd.load(one, current[j], p), simd.load(one, given[j], p)
+            w[j] = simd.load(one, weight[j >> 1], p)
+            late[j] = turns[j] * w[j] * simd.load(one, current[j ^ 1], p)
+            norm = norm + turns[j] * turns[j] * w[j] * own[j] * own[j]
         total, square = there, there
         worth = 1.0 / simd.load(one, share, p)
         of_shift, of_misfit = shift * worth / larger(norm, tiny(one)), misfit * worth
         for k in range(len(ahead)):
             a, c = p + ahead[k], p - ahead[k]
-            # off the mean of both, and either off it
+            by_a, by_c = simd.load(one, present, a), simd.load(one, present, c)
             ss, dd, ts, td = 0.0 * one, 0.0 * one, 0.0 * one, 0.0 * one
             for j in range(size):
-                ar, ai = simd.load(one, current[2 * j], a), simd.load(one, current[2 * j + 1], a)
-                cr, ci = simd.load(one, current[2 * j], c), simd.load(one, current[2 * j + 1], c)
-                sr, si = er[j] - 0.5 * (ar + cr), ei[j] - 0.5 * (ai + ci)
-                dr, di = cr - ar, ci - ai
-                ss = ss + w[j] * sr * sr
-                ss = ss + w[j] * si * si
-                dd = dd + w[j] * dr * dr
-                dd = dd + w[j] * di * di
-                ts = ts + tr[j] * si
-                ts = ts - ti[j] * sr
-                td = td + tr[j] * di
-                td = td - ti[j] * dr
-            by_a, by_c = simd.load(one, present, a), simd.load(one, present, c)
-            dd, td, ts2 = 0.25 * dd, 0.5 * td, larger(ts * ts, 0.0 * one)
-            both = ss + neighbours.MISFIT_OF_ONE * (ss + dd)
-            mirrored = ts2 + neighbours.SHIFT_OF_ONE * (ts2 + td * td)
-            of_a = larger(of_misfit * both, of_shift * mirrored)
-            of_c = of_a
-            if some(smaller(by_a, by_c) <= 0.0):
-                uu, vv, tu, tv = 0.0 * one, 0.0 * one, 0.0 * one, 0.0 * one
-                for j in range(size):
-                    ur = er[j] - simd.load(one, current[2 * j], a)
-                    ui = ei[j] - simd.load(one, current[2 * j + 1], a)
-                    vr = er[j] - simd.load(one, current[2 * j], c)
-                    vi = ei[j] - simd.load(one, current[2 * j + 1], c)
-                    uu, vv = uu + w[j] * ur * ur, vv + w[j] * vr * vr
-                    uu, vv = uu + w[j] * ui * ui, vv + w[j] * vi * vi
-                    tu, tv = tu + tr[j] * ui, tv + tr[j] * vi
-                    tu, tv = tu - ti[j] * ur, tv - ti[j] * vr
-                alone, later = 1.0 + neighbours.MISFIT_OF_ONE, 1.0 + neighbours.SHIFT_OF_ONE
-                tu, tv = later * tu * tu, later * tv * tv
-                of_a = select(
-                    by_c > 0.0, of_a, larger(of_misfit * (alone * uu), of_shift * tu)
-                )
-                of_c = select(
-                    by_a > 0.0, of_c, larger(of_misfit * (alone * vv), of_shift * tv)
-                )
-            sa, sc = _agreement(places[k], of_a), _agreement(places[k], of_c)
+                at_a, at_c = simd.load(one, current[j], a), simd.load(one, current[j], c)
+                at_c = select(by_c > 0.0, at_c, at_a)
+                at_a = select(by_a > 0.0, at_a, at_c)
+                off, half = own[j] - 0.5 * (at_a + at_c), at_c - at_a
+                ss, dd = ss + w[j] * off * off, dd + w[j] * half * half
+                ts, td = ts + late[j] * off, td + late[j] * half
+            ss = ss + neighbours.MISFIT_OF_ONE * (ss + 0.25 * dd)
+            ts = ts * ts + neighbours.SHIFT_OF_ONE * (ts * ts + 0.25 * td * td)
+            agree = 2.0 - larger(of_misfit * ss, of_shift * ts)
+            agree = places[k] * smaller(larger(agree, 0.0 * one), one)
             for j in range(size):
-                mr[j] = mr[j] + sa * simd.load(one, given[2 * j], a)
-                mr[j] = mr[j] + sc * simd.load(one, given[2 * j], c)
-                mi[j] = mi[j] + sa * simd.load(one, given[2 * j + 1], a)
-                mi[j] = mi[j] + sc * simd.load(one, given[2 * j + 1], c)
-            total = total + by_a * sa
-            total = total + by_c * sc
-            square = square + by_a * (sa * sa)
-            square = square + by_c * (sc * sc)
+                both = simd.load(one, given[j], a) + simd.load(one, given[j], c)
+                mean[j] = mean[j] + agree * both
+            total, square = total + agree * (by_a + by_c), square + agree * agree * (by_a + by_c)
         inverse = 1.0 / larger(total, tiny(one))
         for j in range(size):
-            simd.store(following[2 * j], p, mr[j] * inverse)
-            simd.store(following[2 * j + 1], p, mi[j] * inverse)
+            simd.store(following[j], p, mean[j] * inverse)
         simd.store(left, p, select(there > 0.0, there * square * inverse * inverse, one))
 
 
 @njit(nogil=True, error_model="numpy")
 def _join(
-    order: Length, multiples: RealPlane, raw: RealPlanes, current: RealPlanes, weight: RealPlanes,
+    parts: Length, turns: RealPlane, raw: RealPlanes, current: RealPlanes, weight: RealPlanes,
     present: RealPlane, share: RealPlane, beside: Places, misfit: float, following: RealPlanes,
     left: RealPlane, late: RealPlane, known: RealPlane, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write averages as `_joined` has them, what they leave, and residuals by `_averaged`."""
     one = simd.ones(present, 1)
-    size = len(order) + 1
-    er, ei, w = bank(one, order, 1), bank(one, order, 1), bank(one, order, 1)
-    mr, mi = bank(one, order, 1), bank(one, order, 1)
-    nr, ni = bank(one, order, 1), bank(one, order, 1)
-    most = neighbours.OF_NOISE * neighbours.OF_NOISE
+    size = len(parts) + 1
+    mean, near, w = bank(one, parts, 1), bank(one, parts, 1), bank(one, parts, 1)
     for p in range(start, stop, simd.width(one)):
         there, own = simd.load(one, present, p), simd.load(one, share, p)
         lone = select(own > neighbours.LONE, there, 0.0 * one)
         own = own / larger(there, tiny(one))
         best, allowed = own, there
         for j in range(size):
-            er[j], ei[j] = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
-            mr[j], mi[j], w[j] = er[j], ei[j], simd.load(one, weight[j], p)
+            mean[j], w[j] = simd.load(one, current[j], p), simd.load(one, weight[j >> 1], p)
         for k in range(0, len(beside), 2):
             if k == 2 * neighbours.OPPOSITE:
                 allowed = select(best < own, 0.0 * one, lone)
-                if not some(allowed > 0.0):
-                    break
             a, c = p + beside[k], p + beside[k + 1]
             its = simd.load(one, share, a) / larger(simd.load(one, present, a), tiny(one))
             its = its + simd.load(one, share, c) / larger(simd.load(one, present, c), tiny(one))
             its = 0.5 * its
-            better = select(its < best, allowed, 0.0 * one)
-            if not some(better > 0.0):
+            fits = select(its < best, allowed, 0.0 * one)
+            if not some(fits > 0.0):
                 continue
             square, later, norm = 0.0 * one, 0.0 * one, 0.0 * one
             for j in range(size):
-                nr[j] = _weighed(current[2 * j], a, 0.5 * one, c)
-                ni[j] = _weighed(current[2 * j + 1], a, 0.5 * one, c)
-                dr, di = er[j] - nr[j], ei[j] - ni[j]
-                tr, ti = multiples[j] * w[j] * nr[j], multiples[j] * w[j] * ni[j]
-                square = square + w[j] * dr * dr
-                square = square + w[j] * di * di
-                later = later + tr * di
-                later = later - ti * dr
-                norm = norm + multiples[j] * tr * nr[j]
-                norm = norm + multiples[j] * ti * ni[j]
-            noise = there * (own + its)
-            better = select(misfit * square < noise, better, 0.0 * one)
-            fits = select(later * later < most * noise * norm, better, 0.0 * one) > 0.0
-            best = select(fits, its, best)
+                near[j] = 0.5 * (simd.load(one, current[j], a) + simd.load(one, current[j], c))
             for j in range(size):
-                mr[j], mi[j] = select(fits, nr[j], mr[j]), select(fits, ni[j], mi[j])
+                off = simd.load(one, current[j], p) - near[j]
+                square = square + w[j] * off * off
+                later = later + turns[j] * w[j] * near[j ^ 1] * off
+                norm = norm + turns[j] * turns[j] * w[j] * near[j] * near[j]
+            noise = there * (own + its)
+            fits = select(misfit * square < noise, fits, 0.0 * one)
+            noise = neighbours.OF_NOISE * neighbours.OF_NOISE * noise * norm
+            fits = select(later * later < noise, fits, 0.0 * one)
+            best = select(fits > 0.0, its, best)
+            for j in range(size):
+                mean[j] = select(fits > 0.0, near[j], mean[j])
         by, of = 0.0 * one, 0.0 * one
         for j in range(size):
-            simd.store(following[2 * j], p, mr[j])
-            simd.store(following[2 * j + 1], p, mi[j])
-            rr, ri = simd.load(one, raw[2 * j], p), simd.load(one, raw[2 * j + 1], p)
-            tr, ti = multiples[j] * w[j] * mr[j], multiples[j] * w[j] * mi[j]
-            by = by + tr * ri
-            by = by - ti * rr
-            of = of + multiples[j] * tr * mr[j]
-            of = of + multiples[j] * ti * mi[j]
+            simd.store(following[j], p, mean[j])
+            by = by + turns[j] * w[j] * mean[j ^ 1] * simd.load(one, raw[j], p)
+            of = of + turns[j] * turns[j] * w[j] * mean[j] * mean[j]
         simd.store(late, p, by)
         simd.store(known, p, of)
         simd.store(left, p, select(there > 0.0, there * best, one))
@@ -184,13 +123,13 @@ def _join(
 
 @njit(nogil=True, error_model="numpy")
 def _take_back(
-    order: Length, multiples: RealPlane, current: RealPlanes, share: RealPlane, late: RealPlane,
-    known: RealPlane, lines: Places, following: RealPlanes, left: RealPlane, start: int, stop: int,
+    parts: Length, turns: RealPlane, current: RealPlanes, share: RealPlane, late: RealPlane, known:
+    RealPlane, lines: Places, following: RealPlanes, left: RealPlane, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write averages with what is clearly flattened taken back, and what is left of variance."""
     one = simd.ones(late, 1)
     for p in range(start, stop, simd.width(one)):
-        clearest, shift, whole = 0.0 * one, 0.0 * one, 0.0 * one
+        clearest, shift, whole = 0.0 * one, 0.0 * one, tiny(one)
         for line in range(0, len(lines), 9):  # of nine pixels each
             by, of = 0.0 * one, 0.0 * one
             for k in range(line, line + 9):
@@ -199,23 +138,22 @@ def _take_back(
             clear = by * by / larger(of, tiny(one))
             better, clearest = clear > clearest, larger(clear, clearest)
             shift, whole = select(better, by, shift), select(better, of, whole)
-        back, whole = clearest > neighbours.CLEAR, larger(whole, tiny(one))
+        back = clearest > neighbours.CLEAR
         shift = select(back, shift / whole, 0.0 * one)
         doubt = larger(clearest - neighbours.EXPECTED, 0.0 * one)
         doubt = select(back, 0.0 * one + neighbours.OF_CHOICE, doubt)
         doubt = simd.load(one, share, p) + doubt * simd.load(one, known, p) / whole
         simd.store(left, p, smaller(doubt, one))
-        for j in range(len(order) + 1):
-            turned = multiples[j] * shift
-            er, ei = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
-            simd.store(following[2 * j], p, er - turned * ei)
-            simd.store(following[2 * j + 1], p, ei + turned * er)
+        for j in range(len(parts) + 1):
+            turned = turns[j] * shift * simd.load(one, current[j ^ 1], p)
+            simd.store(following[j], p, simd.load(one, current[j], p) + turned)
 
 
 def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile averaging over neighbours of order m; see the table in ``_kernels``."""
-    order = (0,) * m
-    average, join, take_back = (entry(each, m, precision) for each in (_round, _join, _take_back))
+    parts = (0,) * (2 * m + 1)
+    kernels = (entry(each, m, precision, parts=len(parts)) for each in (_round, _join, _take_back))
+    average, join, take_back = kernels
 
     def kernel(
         raw: Complexes,
@@ -240,12 +178,12 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
 
         def over_rows(run: Callable[..., Any], *given: Any) -> None:
             def part(top: int, end: int) -> None:
-                run(order, orders, *given, first + top * row, first + end * row)
+                run(parts, turns, *given, first + top * row, first + end * row)
 
             spread(part, height, _ROWS)
 
-        planes, orders = 2 * len(raw), np.array(multiples, np.float32)
-        own, other, spare, weights = room(planes), room(planes), room(planes), room(len(raw))
+        turns = np.outer(multiples, (-1, 1)).ravel().astype(np.float32)
+        own, other, spare, weights = (room(each) for each in (*(turns.size,) * 3, len(raw)))
         there, share, left, late, known = room(5)
         share[:], left[:], current = 1, 1, own
 
@@ -267,7 +205,9 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             current, other = other, spare if current is own else current
             share, left = left, share
         misfit = 1 / (float(numbers) + neighbours.OF_NOISE * (2 * float(numbers)) ** 0.5)
-        beside, lines = ((each @ (row, 1)).ravel() for each in (neighbours.BESIDE, neighbours.LINES))
+        beside, lines = (
+            (each @ (row, 1)).ravel() for each in (neighbours.BESIDE, neighbours.LINES)
+        )
         rest = weights, there, share, beside, misfit
         over_rows(join, own, current, *rest, other, left, late, known)
         over_rows(take_back, other, left, late, known, lines, current, share)

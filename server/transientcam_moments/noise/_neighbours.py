@@ -174,7 +174,7 @@ def _averaged(
     least = np.finfo(weight.dtype).tiny
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
     current, share = raw, xp.ones_like(there)
-    lit, given = _padded(there), _padded(raw)
+    lit, given = _padded(there), _padded(raw * there)
     for radius_px in RADII_PX:
         wide = _padded(current)
         tangent = order * weight * current
@@ -184,23 +184,17 @@ def _averaged(
         for row, column, place in neighbourhood(radius_px):
             ahead, behind = ((row, column), (-row, -column))
             by = [_shifted(lit, *offset) for offset in (ahead, behind)]
-            off = [current - _shifted(wide, *offset) for offset in (ahead, behind)]
-            alone = [(weight * squared(each)).sum(0) for each in off]
-            later = [(tangent.conj() * each).imag.sum(0) for each in off]
-            product = (weight * (off[0] * off[1].conj()).real).sum(0)
-            both = (alone[0] + alone[1]) / 4 + product / 2
-            mirrored = ((later[0] + later[1]) / 2) ** 2
-            beside = (alone[0] + alone[1]) / 2, (later[0] ** 2 + later[1] ** 2) / 2
-            both, mirrored = both + MISFIT_OF_ONE * beside[0], mirrored + SHIFT_OF_ONE * beside[1]
-            for i, offset in enumerate((ahead, behind)):
-                paired, single = by[1 - i] > 0, later[i] ** 2
-                one = xp.where(paired, both, (1 + MISFIT_OF_ONE) * alone[i])
-                two = xp.where(paired, mirrored, (1 + SHIFT_OF_ONE) * single)
-                doubt = xp.maximum(misfit * one, shift * two) / share
-                agreement = place * xp.clip(2 - doubt, 0, 1)
-                counts = by[i] * agreement
-                mean = mean + counts * _shifted(given, *offset)
-                total, square = total + counts, square + counts * agreement
+            near = [_shifted(wide, *offset) for offset in (ahead, behind)]
+            near = [xp.where(by[i] > 0, near[i], near[1 - i]) for i in (0, 1)]  # both, or the one
+            off, half = current - (near[0] + near[1]) / 2, (near[1] - near[0]) / 2
+            one = (1 + MISFIT_OF_ONE) * squared(off) + MISFIT_OF_ONE * squared(half)
+            two = (1 + SHIFT_OF_ONE) * (tangent.conj() * off).imag.sum(0) ** 2
+            two = two + SHIFT_OF_ONE * (tangent.conj() * half).imag.sum(0) ** 2
+            doubt = xp.maximum(misfit * (weight * one).sum(0), shift * two) / share
+            agreement = place * xp.clip(2 - doubt, 0, 1)
+            both = _shifted(given, *ahead) + _shifted(given, *behind)
+            mean, counts = mean + agreement * both, agreement * (by[0] + by[1])
+            total, square = total + counts, square + counts * agreement
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(there > 0, there * square / total / total, 1)
     current, share = _joined(current.astype(raw.dtype), share, weight, there, multiples, numbers)
