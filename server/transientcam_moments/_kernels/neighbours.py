@@ -211,14 +211,8 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         rest = weights, there, share, beside, misfit
         over_rows(join, own, current, *rest, other, left, late, known)
         over_rows(take_back, other, left, late, known, lines, current, share)
-        moments, final = np.empty(raw.shape, np.complex64), np.empty((height, width), np.float32)
-
-        def give_out(top: int, end: int) -> None:
-            rows, view = np.s_[:, top:end], picture(current)
-            moments.real[rows], moments.imag[rows] = view[0::2][rows], view[1::2][rows]
-            final[top:end] = picture(share)[0, top:end]
-
-        spread(give_out, height, _ROWS)
-        return moments, final
+        moments, view = np.empty(raw.shape, np.complex64), picture(current)
+        moments.real, moments.imag = view[0::2], view[1::2]
+        return moments, np.ascontiguousarray(picture(share)[0])
 
     return kernel
