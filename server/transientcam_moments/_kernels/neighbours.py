@@ -205,11 +205,10 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             current, other = other, spare if current is own else current
             share, left = left, share
         misfit = 1 / (float(numbers) + neighbours.OF_NOISE * (2 * float(numbers)) ** 0.5)
-        beside, lines = (
-            (each @ (row, 1)).ravel() for each in (neighbours.BESIDE, neighbours.LINES)
+        beside, lines = (np.ravel(at @ (row, 1)) for at in (neighbours.BESIDE, neighbours.LINES))
+        over_rows(
+            join, own, current, weights, there, share, beside, misfit, other, left, late, known
         )
-        rest = weights, there, share, beside, misfit
-        over_rows(join, own, current, *rest, other, left, late, known)
         over_rows(take_back, other, left, late, known, lines, current, share)
         moments, view = np.empty(raw.shape, np.complex64), picture(current)
         moments.real, moments.imag = view[0::2], view[1::2]
