@@ -1,6 +1,5 @@
 """Averaging moments over neighbouring pixels, but not across edges: adaptive weights."""
 
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from transientcam_moments.arrays import Array, as_array, namespace, real_type, s
 from transientcam_moments.errors import ShapeError
 from transientcam_moments.noise._moments import MomentNoise
 
-RADII_PX: Final = (1.5, 2.2, 3.2, 4.5)
+RADII_PX: Final = (1.5, 2.2, 4.5)
 """Of the neighbourhoods, one a round."""
 REACH: Final = 4
 """Rows and columns beside a pixel that the largest neighbourhood reaches."""
@@ -24,14 +23,21 @@ SHIFT_OF_ONE: Final = 0.001
 """Weights of a neighbour alone beside those of its mean with its mirror image."""
 LONE: Final = 0.5
 """Share of its variance left, above which a pixel agreed with no pair of neighbours."""
-OF_NOISE: Final = 4.0
-"""Deviations by which noise alone may put such a pixel off."""
-_BESIDE: Final = np.array([[0, 1, 1, 1], [1, 0, 1, -1]])[..., None]
-"""Rows and columns of four neighbours, opposite to four others."""
+OF_NOISE: Final = 5.0
+"""Deviations of an average and of those beside it, up to which noise alone may part them."""
+_NEAR: Final = ((0, 1), (1, 0), (1, 1), (1, -1))
+BESIDE: Final = np.array(
+    [[(y, x), (-y, -x)] for y, x in _NEAR]
+    + [[(sign * y, sign * x)] * 2 for y, x in _NEAR for sign in (1, -1)]
+)
+"""Rows and columns of `OPPOSITE` neighbours and their mirror images, then of each by itself."""
+OPPOSITE: Final = len(_NEAR)
 EXPECTED: Final = 5.0
 """Chi-square of the clearest line of residuals that noise explains."""
 CLEAR: Final = 12.0
-"""And from which it is taken back: noise exceeds it in one pixel of five thousand."""
+"""And from which it is taken back: noise exceeds it in one pixel of five hundred."""
+OF_CHOICE: Final = 2.0
+"""Times the variance of its mean, as the clearest of twelve is chosen."""
 _STEPS: Final = (
     ((0, 1), (0, 2)), ((1, 0), (2, 0)), ((1, 1), (2, 2)), ((1, -1), (2, -2)),
     ((1, 0), (2, 1)), ((-1, 0), (-2, -1)), ((1, 0), (2, -1)), ((-1, 0), (-2, 1)),
@@ -108,11 +114,12 @@ def average_neighbours(
     weight falls with its distance and with misfit over noise. The mean of a neighbour and its
     mirror image is held against the pixel, so that slanted surfaces pass, and both get one weight,
     so that noise does not move the mean along the slope; a second misfit is the one in the
-    direction d b_j = i j b_j, all light later, so that small steps in range show. Of pixels that
-    agree with no pair noise has put more off than structure has: within `OF_NOISE` deviations they
-    get the average of both sides beside them, or of one where no two agree. What is flattened
+    direction d b_j = i j b_j, all light later, so that small steps in range show. A pixel that its
+    own noise puts off is left with few neighbours, which are off alike: within `OF_NOISE`
+    deviations it gets the mean of the two averages beside it that rest on most pixels, if that is
+    more than its own does, or the average of one side where it agreed with none. What is flattened
     leaves residuals of one sign along a line of nine pixels: where they are clear the pixel gets
-    their mean back, with its variance; else their square counts as noise.
+    their mean back, with `OF_CHOICE` times its variance; else their square counts as noise.
     """
     moments = as_array(moments)
     if moments.ndim != 3:
@@ -167,7 +174,7 @@ def _averaged(
     least = np.finfo(weight.dtype).tiny
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
     current, share = raw, xp.ones_like(there)
-    lit, given = _padded(there), _padded(raw)
+    lit, given = _padded(there), _padded(raw * there)
     for radius_px in RADII_PX:
         wide = _padded(current)
         tangent = order * weight * current
@@ -177,82 +184,53 @@ def _averaged(
         for row, column, place in neighbourhood(radius_px):
             ahead, behind = ((row, column), (-row, -column))
             by = [_shifted(lit, *offset) for offset in (ahead, behind)]
-            off = [current - _shifted(wide, *offset) for offset in (ahead, behind)]
-            alone = [(weight * squared(each)).sum(0) for each in off]
-            later = [(tangent.conj() * each).imag.sum(0) for each in off]
-            product = (weight * (off[0] * off[1].conj()).real).sum(0)
-            both = (alone[0] + alone[1]) / 4 + product / 2
-            mirrored = ((later[0] + later[1]) / 2) ** 2
-            beside = (alone[0] + alone[1]) / 2, (later[0] ** 2 + later[1] ** 2) / 2
-            both, mirrored = both + MISFIT_OF_ONE * beside[0], mirrored + SHIFT_OF_ONE * beside[1]
-            for i, offset in enumerate((ahead, behind)):
-                paired, single = by[1 - i] > 0, later[i] ** 2
-                one = xp.where(paired, both, (1 + MISFIT_OF_ONE) * alone[i])
-                two = xp.where(paired, mirrored, (1 + SHIFT_OF_ONE) * single)
-                doubt = xp.maximum(misfit * one, shift * two) / share
-                agreement = place * xp.clip(2 - doubt, 0, 1)
-                counts = by[i] * agreement
-                mean = mean + counts * _shifted(given, *offset)
-                total, square = total + counts, square + counts * agreement
+            near = [_shifted(wide, *offset) for offset in (ahead, behind)]
+            near = [xp.where(by[i] > 0, near[i], near[1 - i]) for i in (0, 1)]  # both, or the one
+            off, half = current - (near[0] + near[1]) / 2, (near[1] - near[0]) / 2
+            one = (1 + MISFIT_OF_ONE) * squared(off) + MISFIT_OF_ONE * squared(half)
+            two = (1 + SHIFT_OF_ONE) * (tangent.conj() * off).imag.sum(0) ** 2
+            two = two + SHIFT_OF_ONE * (tangent.conj() * half).imag.sum(0) ** 2
+            doubt = xp.maximum(misfit * (weight * one).sum(0), shift * two) / share
+            agreement = place * xp.clip(2 - doubt, 0, 1)
+            both = _shifted(given, *ahead) + _shifted(given, *behind)
+            mean, counts = mean + agreement * both, agreement * (by[0] + by[1])
+            total, square = total + counts, square + counts * agreement
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(there > 0, there * square / total / total, 1)
-    return finished(raw, current.astype(raw.dtype), share, weight, there, multiples, numbers)
+    current, share = _joined(current.astype(raw.dtype), share, weight, there, multiples, numbers)
+    late = (order * weight * (current.conj() * raw).imag).sum(0)  # of what is left
+    known = (order**2 * weight * squared(current)).sum(0)  # their own would be real
+    clearest, shift, whole = _clearest_line(xp.stack([late, known]))
+    whole, back = xp.maximum(whole, least), clearest > CLEAR
+    turned = (1j * order * xp.where(back, shift / whole, 0)).astype(raw.dtype)
+    doubt = xp.where(back, OF_CHOICE, xp.maximum(clearest - EXPECTED, 0)) * known / whole
+    return current + turned * current, xp.minimum(share + doubt, 1).astype(weight.dtype)
 
 
 def _joined(
-    raw: Array, found: Array, share: Array, weight: Array, there: Array,
-    multiples: tuple[int, ...], numbers: Array,
+    found: Array, share: Array, weight: Array, there: Array, multiples: tuple[int, ...],
+    numbers: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Return averages and shares with those of neighbours where a pixel was left alone by noise."""
-    xp, lone = namespace(raw), (share > LONE) & (there > 0)
-    known_values = isinstance(lone, np.ndarray)  # few are looked at; else all, as there is no count
-    places = np.flatnonzero(lone) if known_values else xp.arange(lone.size)
-    row, column = (each + REACH for each in divmod(places, share.shape[1]))
-    sides = [(row + way * _BESIDE[0], column + way * _BESIDE[1]) for way in (1, -1)]
-
-    def beside(planes: Array, both: Callable[..., Array]) -> Array:
-        """Return what is on both sides (..., 12, P), and on each."""
-        ahead, behind = (_padded(planes)[..., r, c] for r, c in sides)
-        return xp.concatenate([both(ahead, behind), ahead, behind], axis=-2)
-
-    mean, its = (beside(each, lambda a, b: (a + b) / 2) for each in (found, share))
-    own, of_one = (each.reshape((len(each), 1, -1))[..., places] for each in (raw, weight))
+    """Return averages and shares, of those beside where they rest on more and noise parts them."""
+    xp, least = namespace(found), np.finfo(weight.dtype).eps ** 2  # frames: as good as none
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
-    off, tangent = own - mean, order * of_one * mean
-    misfit = (of_one * squared(off)).sum(0) / numbers
-    later = (tangent.conj() * off).imag.sum(0) ** 2
-    noise = (misfit < 1 + OF_NOISE * (2 / numbers) ** 0.5) & (its < LONE)
-    noise = noise & (later < OF_NOISE**2 * (order * (tangent.conj() * mean).real).sum(0))
-    misfit = xp.where(noise & (beside(there, xp.minimum) > 0), misfit, np.inf)
-    pairs = misfit[: _BESIDE.shape[1]]  # before one side, which is off by a slope
-    paired, any_of_them = (xp.isfinite(each.min(axis=0)) for each in (pairs, misfit))
-    best = xp.where(paired, pairs.argmin(axis=0), misfit.argmin(axis=0))[None]
-    mean = xp.where(any_of_them, xp.take_along_axis(mean, best[None], axis=1)[:, 0], own[:, 0])
-    its = xp.where(any_of_them, xp.take_along_axis(its, best, axis=0)[0], share.reshape(-1)[places])
-    if known_values:
-        found, share = found.copy(), share.copy()
-        found.reshape((len(found), -1))[:, places], share.reshape(-1)[places] = mean, its
-        return found, share
-    mean, its = mean.reshape(found.shape), its.reshape(share.shape)
-    return xp.where(lone, mean, found), xp.where(lone, its, share)
-
-
-def finished(
-    raw: Array, current: Array, share: Array, weight: Array, there: Array,
-    multiples: tuple[int, ...], numbers: Array, search: Callable[[Array], Array] | None = None,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return averages and shares of all rounds once lone pixels and residuals are looked at."""
-    xp = namespace(raw)
-    current, share = _joined(raw, current, share, weight, there, multiples, numbers)
-    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
-    scaled = order * weight
-    late = (scaled * (current.conj() * raw).imag).sum(0)  # of what is left: their own is real
-    known = (order * scaled * squared(current)).sum(0)
-    clearest, shift, whole = (search or _clearest_line)(xp.stack([late, known]))
-    whole, back = xp.maximum(whole, np.finfo(weight.dtype).tiny), clearest > CLEAR
-    turned = (1j * order * xp.where(back, shift / whole, 0)).astype(current.dtype)
-    doubt = xp.where(back, 1, xp.maximum(clearest - EXPECTED, 0)) * known / whole
-    return current + turned * current, xp.minimum(share + doubt, 1).astype(weight.dtype)
+    wide, worth = _padded(found), _padded(there / share)
+    own = 1 / xp.maximum(there / share, least)  # of the variance of one frame
+    mean, best, allowed = found, own, there > 0
+    for i, sides in enumerate(BESIDE.tolist()):
+        if i == OPPOSITE:  # one side is off by a slope
+            allowed = (share > LONE) & (best == own)
+        near = (_shifted(wide, *sides[0]) + _shifted(wide, *sides[1])) / 2
+        its = sum(0.5 / xp.maximum(_shifted(worth, *each), least) for each in sides)
+        off, tangent = found - near, order * weight * near
+        noise = there * (own + its)
+        fits = allowed & (its < best)
+        misfit = (weight * squared(off)).sum(0) / numbers
+        fits = fits & (misfit < (1 + OF_NOISE * (2 / numbers) ** 0.5) * noise)
+        known = (order * (tangent.conj() * near).real).sum(0)
+        fits = fits & ((tangent.conj() * off).imag.sum(0) ** 2 < OF_NOISE**2 * noise * known)
+        mean, best = xp.where(fits, near, mean), xp.where(fits, its, best)
+    return mean, xp.where(there > 0, there * best, 1)
 
 
 def _clearest_line(both: Array) -> Array:

@@ -16,9 +16,7 @@ PAIRS: Final = neighbours.neighbourhood(neighbours.RADII_PX[-1])
 _AHEAD: Final = np.array([pair[:2] for pair in PAIRS])
 _SQUARE_PX: Final = (_AHEAD**2).sum(axis=1)
 _ALL: Final = np.array([1.0, *(each for pair in PAIRS for each in (pair[2], pair[2]))])
-_CHOSEN: Final = 1.2
-"""Variance of the range over the stated one: which neighbours agree follows a pixel's own noise."""
-LEAST_SHARE: Final = _CHOSEN * float((_ALL**2).sum() / _ALL.sum() ** 2)
+LEAST_SHARE: Final = float((_ALL**2).sum() / _ALL.sum() ** 2)
 """Of the variance, where all neighbours agree."""
 _OF_MEAN: Final = 1.5
 """Variance of a pixel less the mean of two others, over that of each."""
@@ -66,4 +64,4 @@ def averaged(
         total = 1 + agreement.sum(axis=(0, 2))
         share = ((1 + (agreement**2).sum(axis=(0, 2))) / total**2)[:, None]
     mean = (b + (agreement * near).sum(axis=(1, 3))) / total
-    return mean, np.minimum(_CHOSEN * share[:, 0], 1)
+    return mean, share[:, 0]

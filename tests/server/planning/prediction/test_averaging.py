@@ -42,8 +42,8 @@ def test_as_much_noise_is_left_as_averaging_leaves(slope_rad: float, m: int) -> 
 
     mean, share = averaged(b, pixels, variance(b, pixels))
 
-    # as noisy as they are, and by a fifth more in range
-    assert np.median(share) == pytest.approx(1.2 * np.median(captured.share[INNER]), rel=0.2)
+    # a little more than where averages of more pixels are beside
+    assert np.median(share) == pytest.approx(np.median(captured.share[INNER]), rel=0.25)
     assert np.abs(mean - b.reshape((m + 1, -1))[:, pixels]).max() < STD
 
 
