@@ -188,8 +188,9 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
     # the file that was downloaded, dropped on the page, is found among the recordings
     drop(page, f"corner-{recording} (1).h5", b"")
     expect(page.locator("[data-field=state]")).to_have_text("Replay")
-    drop(page, "other.h5", b"")
-    expect(page.locator(".toast", has_text="no recording like other.h5")).to_be_visible()
+    watch.refusals_expected = True
+    drop(page, "other.h5", b"no HDF5")
+    expect(page.locator(".toast", has_text="It is no whole recording")).to_be_visible()
     choose_from(row, "More of corner", "Delete…")
     confirm = page.get_by_role("dialog", name="Delete this recording?")
     confirm.get_by_role("button", name="Keep").click()
