@@ -199,6 +199,16 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
     confirm.get_by_role("button", name="Delete").click()
     expect(row).to_have_count(0)
     assert httpx.get(url).status_code == 404
+    # as one of elsewhere it is sent, kept under its id, and shown
+    drop(page, "theirs.h5", Path(download.value.path()).read_bytes())
+    expect(row).to_have_count(1)
+    shows_recorded(page, 2)
+    wanted = recorded(served, recording, 2, "range")
+    page.wait_for_function(
+        "([at, value]) => Math.abs(transientcam.store.frames.of('range').peek().values[at] - value)"
+        " < 1e-6",
+        arg=[163 * 60 + 80, float(wanted[60, 80])],
+    )
 
 
 def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served) -> None:

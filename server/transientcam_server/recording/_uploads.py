@@ -28,8 +28,10 @@ from transientcam_server.recording._reader import Recording
 from transientcam_server.recording._salvage import write_whole
 from transientcam_server.settings import RecordingSettings
 
-_START_S: Final = 60.0
+_START_S: Final = 120.0
 """For a process to start, also on a laden machine."""
+_NICE: Final = 5
+"""Frames go before it, and a user waits for it."""
 _SLOWEST_BYTES_S: Final = 1e6
 _REASON_CHARACTERS: Final = 300
 
@@ -86,7 +88,7 @@ class Upload:
             if time.monotonic() > ends_s:
                 raise _invalid(f"it was not read within {limit_s:.0f} s")
 
-        child = ChildProcess()
+        child = ChildProcess(nice=_NICE)
         with self._using:
             try:
                 files = self._sent, self._anew
