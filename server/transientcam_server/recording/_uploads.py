@@ -153,15 +153,14 @@ def rewrite(
             if known is not None or not is_id(found):
                 found = fresh_id
             header = replace(recording.header, recording_id=found)
-            for what, document, most in (
-                ("annotations", recording.annotations, layout.ANNOTATIONS_BYTES),
-                ("end", recording.end, layout.END_BYTES),
+            end, annotations = recording.end, recording.annotations
+            for document, most in (
+                (annotations, layout.ANNOTATIONS_BYTES),
+                (end, layout.END_BYTES),
             ):
                 if (size := len(layout.encoded(document))) > most:
-                    raise ValueError(f"its {what} take {size} bytes, more than {most}")
-            empty = layout.image(
-                header, recording.annotations, labels=recording.labels, end=recording.end
-            )
+                    raise ValueError(f"a text of {size} bytes has room for {most}")
+            empty = layout.image(header, annotations, labels=recording.labels, end=end)
             write_whole(anew, empty, _frames(recording, directory, least_free_bytes))
     except (OSError, MemoryError):
         raise
@@ -172,8 +171,7 @@ def rewrite(
 
 def _has_frames_of(recording: Recording, known: Path) -> bool:
     with contextlib.suppress(NotARecording, OSError), Recording(known) as here:
-        checksums = [each.series("crc32").tolist() for each in (recording, here)]
-        return checksums[0] == checksums[1]
+        return np.array_equal(recording.series("crc32"), here.series("crc32"))
     return False
 
 

@@ -110,8 +110,9 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
 async def import_recording(service: ServiceOf, request: Request) -> RecordingDocument:
     """Keep the recording that is sent as body, under its id, or a new one where that is taken.
 
-    One that is here already stays as it is. A process of its own reads it and writes it anew, with all its frames as they were captured. A
-    client that leaves before the answer ends it, and nothing is kept.
+    One that is here already stays as it is. A process of its own reads it and writes it anew, with
+    all its frames as they were captured. A client that leaves before the answer ends it, and
+    nothing is kept.
     """
     library = service.recordings
     length = request.headers.get("content-length", "")
