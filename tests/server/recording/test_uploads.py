@@ -144,7 +144,7 @@ def test_a_full_disk_refuses_what_is_announced_and_what_comes_unannounced(tmp_pa
         Upload(directory, free, FRESH, 2**62)
 
     sent = Upload(directory, free, FRESH, 0)
-    free.__dict__["min_free_bytes"] = 2**62  # others have filled the disk meanwhile
+    vars(free)["min_free_bytes"] = 2**62  # others have filled the disk meanwhile
     with pytest.raises(Problem, match="have to stay so"):
         sent.write(b"more")
     sent.close()

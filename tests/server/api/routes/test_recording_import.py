@@ -137,7 +137,7 @@ def test_a_full_disk_refuses_it_before_it_is_sent(
     daemon: Served, http: httpx.Client, directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings: Any = daemon.settings.recordings
-    monkeypatch.setitem(settings.__dict__, "min_free_bytes", 2**62)
+    monkeypatch.setitem(vars(settings), "min_free_bytes", 2**62)
 
     answer = http.post(IMPORT, content=b"anything")
 
