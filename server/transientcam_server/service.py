@@ -123,6 +123,8 @@ class Service:
         Set once the service ends: what takes long asks for it.
     simulating
         Held while another simulated scene is prepared.
+    taking_in
+        Held while a recording that was sent here is read.
     sensor
         As the camera, its origin or the settings state it; None where none does.
     observers
@@ -140,6 +142,7 @@ class Service:
         self.observers: list[Observer] = []
         self.closing = threading.Event()
         self.simulating = asyncio.Lock()
+        self.taking_in = asyncio.Lock()
         self._superseded: list[Frame] = []
         self._successor: tuple[str, Camera] | None = None
         self._changing = asyncio.Lock()

@@ -359,6 +359,8 @@ class RecordingSettings(_Group):
     """No recording grows larger."""
     min_free_bytes: int = Field(default=1024**3, ge=0)
     """Recordings end when the disk has no more than this left."""
+    max_upload_bytes: int = Field(default=2 * 1024**3, ge=0)
+    """None that is sent here is larger, also as it is written anew."""
     queue_bytes: int = Field(default=256 * 1024**2, ge=0)
     """Frames that wait for the disk before some are dropped."""
     stalled_s: _Finite = Field(default=5.0, gt=0.0, le=3600.0)
@@ -388,7 +390,7 @@ class LimitSettings(_Group):
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
     """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)
-    """Time for its body."""
+    """Time for its body, of a file for each MiB."""
     answers_bytes: int = Field(default=48 * 1024**2, ge=1024**2)
     """Of answers on their way to clients, together; one more is refused, to try again later."""
     answers_bytes_per_address: int = Field(default=24 * 1024**2, ge=1024**2)

@@ -188,8 +188,9 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
     # the file that was downloaded, dropped on the page, is found among the recordings
     drop(page, f"corner-{recording} (1).h5", b"")
     expect(page.locator("[data-field=state]")).to_have_text("Replay")
-    drop(page, "other.h5", b"")
-    expect(page.locator(".toast", has_text="no recording like other.h5")).to_be_visible()
+    watch.refusals_expected = True
+    drop(page, "other.h5", b"no HDF5")
+    expect(page.locator(".toast", has_text="It is no whole recording")).to_be_visible()
     choose_from(row, "More of corner", "Delete…")
     confirm = page.get_by_role("dialog", name="Delete this recording?")
     confirm.get_by_role("button", name="Keep").click()
@@ -198,6 +199,16 @@ def test_a_recording_is_annotated_downloaded_and_deleted(
     confirm.get_by_role("button", name="Delete").click()
     expect(row).to_have_count(0)
     assert httpx.get(url).status_code == 404
+    # as one of elsewhere it is sent, kept under its id, and shown
+    drop(page, "theirs.h5", Path(download.value.path()).read_bytes())
+    expect(row).to_have_count(1)
+    shows_recorded(page, 2)
+    wanted = recorded(served, recording, 2, "range")
+    page.wait_for_function(
+        "([at, value]) => Math.abs(transientcam.store.frames.of('range').peek().values[at] - value)"
+        " < 1e-6",
+        arg=[163 * 60 + 80, float(wanted[60, 80])],
+    )
 
 
 def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served) -> None:

@@ -125,7 +125,8 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     permissions.describe(app, [resource.router for resource in _RESOURCES], prefix=API)
     openapi.describe_limits(app, camera.capabilities, prefix=API)
     # the last one added is the first to see a request
-    app.add_middleware(BodyLimit, counted_elsewhere=frozenset((f"{API}{calibrations.IMPORT}",)))
+    files = frozenset(f"{API}{each}" for each in (calibrations.IMPORT, recordings.IMPORT))
+    app.add_middleware(BodyLimit, counted_elsewhere=files)
     app.add_middleware(AnswerLimit, limits=settings.limits)
     app.add_middleware(Authentication, guard=guard)
     app.add_middleware(OriginCheck, settings=settings)

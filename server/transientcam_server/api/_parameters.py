@@ -143,7 +143,7 @@ def of_history(settings: HistorySettings) -> Iterator[ParameterDocument]:
 
 def of_recordings(settings: RecordingSettings) -> Iterator[ParameterDocument]:
     """Describe when recordings end by themselves."""
-    limits = ("max_duration_s", "max_bytes", "min_free_bytes")
+    limits = ("max_duration_s", "max_bytes", "min_free_bytes", "max_upload_bytes")
     return _of_model(
         "recordings",
         "/api/v1/recordings",

@@ -20,6 +20,8 @@ from transientcam_server.settings import LimitSettings
 
 _END: Final = b"\r\n\r\n"
 """Of a head, and of a body in chunks (RFC 9112, Sec. 2.1, 7.1)."""
+_RENEWED_BYTES: Final = 1024**2
+"""Of a body, after which the next ones have their time; only those of files are as long."""
 
 
 class BoundedConnection(CutWhereStalled, HttpToolsProtocol):
@@ -38,7 +40,7 @@ class BoundedConnection(CutWhereStalled, HttpToolsProtocol):
         self._tail = b""
         self._in_head = True
         self._in_works = False
-        self._body_left = 0
+        self._body_left = self._body_bytes = 0
         self._beside_bytes = 0
 
     # -- of the transport ----------------------------------------------------------------------
@@ -78,7 +80,7 @@ class BoundedConnection(CutWhereStalled, HttpToolsProtocol):
     def on_headers_complete(self) -> None:
         """Expect the body."""
         self._in_head = False
-        self._beside_bytes = 0
+        self._beside_bytes = self._body_bytes = 0
         self._body_left = _length(self.headers)
         self._expect_within(self._limits.body_s)
         self.scope.setdefault("state", {})["offs"] = self.transport.offs
@@ -91,6 +93,10 @@ class BoundedConnection(CutWhereStalled, HttpToolsProtocol):
         """Take a part of the body: it allows for as much beside it, as the sizes of its chunks."""
         self._beside_bytes -= 2 * len(body)
         self._body_left = max(0, self._body_left - len(body))
+        self._body_bytes += len(body)
+        if self._body_bytes >= _RENEWED_BYTES and self._unanswered:
+            self._body_bytes = 0
+            self._expect_within(self._limits.body_s)
         super().on_body(body)
 
     def on_message_complete(self) -> None:

@@ -32,5 +32,6 @@ from transientcam_server.recording._recovery import recover
 from transientcam_server.recording._replay import ReplayCamera
 from transientcam_server.recording._salvage import salvage
 from transientcam_server.recording._storage import Storage, open_unknown
+from transientcam_server.recording._uploads import Upload
 from transientcam_server.recording._writer import RecordingWriter
 from transientcam_server.recording._zarr_keys import ZarrKeys, is_of_chunk

@@ -25,6 +25,15 @@ class Directory:
         """Return the free space of its disk. Raises OSError if it does not exist yet."""
         return shutil.disk_usage(self.path).free
 
+    def require_free(self, least_bytes: int, *, more_bytes: int = 0) -> None:
+        """Refuse to write so many bytes more where less than ``least_bytes`` would stay free.
+
+        Raises OSError then, and where it does not exist yet.
+        """
+        if (free := self.free_bytes()) - more_bytes < least_bytes:
+            more = f" of which {more_bytes} are wanted," * (more_bytes > 0)
+            raise OSError(28, f"{free} bytes are free,{more} {least_bytes} have to stay so")
+
     def new(self, recording_id: str) -> Path:
         """Return the path of a new recording."""
         return self.path / (recording_id + layout.SUFFIX)
@@ -36,9 +45,7 @@ class Directory:
         except OSError:
             return []
         suffixes = (layout.SUFFIX, layout.PART_SUFFIX)
-        named = {
-            path for path in entries if path.name.endswith(suffixes) and _ID.fullmatch(id_of(path))
-        }
+        named = {path for path in entries if path.name.endswith(suffixes) and is_id(id_of(path))}
         found = {path for path in named if _is_plain(path)}
         # what was unfinished when it was listed may have been finished, and renamed, since
         finished = {self.new(id_of(path)) for path in named - found}
@@ -67,6 +74,11 @@ class Directory:
             for each in (part, path.with_suffix(layout.SCRATCH_SUFFIX), path):
                 each.unlink(missing_ok=True)
             swmr.synchronise(self.path)
+
+
+def is_id(text: str) -> bool:
+    """Return whether a recording may have this id."""
+    return bool(_ID.fullmatch(text))
 
 
 def _is_plain(path: Path) -> bool:

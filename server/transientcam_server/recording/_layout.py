@@ -112,13 +112,31 @@ def checksum(images: NDArray[np.uint16]) -> int:
     return isal_zlib.crc32(np.ascontiguousarray(images, dtype="<u2").data.cast("B"))
 
 
-def image(header: Header, annotations: Mapping[str, Any]) -> bytes:
-    """Return the bytes of an empty recording, complete but for its frames."""
-    return swmr.image_of(lambda file: _create(file, header, annotations))
+def image(
+    header: Header,
+    annotations: Mapping[str, Any],
+    *,
+    labels: tuple[ImageLabel, ...] | None = None,
+    end: Mapping[str, Any] | None = None,
+) -> bytes:
+    """Return the bytes of an empty recording, complete but for its frames.
+
+    ``labels``: of the images, where they are not those of its sequence.
+    ``end``: how it ended, where that is known.
+    """
+    labels = header.applied.labels if labels is None else labels
+    last = b"" if end is None else encoded(end)
+    return swmr.image_of(lambda file: _create(file, header, annotations, labels, last))
 
 
-def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> None:
-    capabilities, labels = header.capabilities, header.applied.labels
+def _create(
+    file: swmr.File,
+    header: Header,
+    annotations: Mapping[str, Any],
+    labels: tuple[ImageLabel, ...],
+    end: bytes,
+) -> None:
+    capabilities = header.capabilities
     file.attrs.update(
         {
             "format": FORMAT,
@@ -153,7 +171,7 @@ def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> 
         if "bad" in file:
             file["calibration_bad"] = file["bad"]
     file.create_dataset("annotations", data=encoded(annotations), dtype=f"S{ANNOTATIONS_BYTES}")
-    file.create_dataset("end", data=b"", dtype=f"S{END_BYTES}")
+    file.create_dataset("end", data=end, dtype=f"S{END_BYTES}")
     _scale(file)
 
 

@@ -31,6 +31,7 @@ from transientcam_server.recording._problems import (
     unknown,
 )
 from transientcam_server.recording._recorder import Limits, Recorder, Totals
+from transientcam_server.recording._uploads import Upload
 from transientcam_server.recording._writer import RecordingWriter, annotate
 from transientcam_server.settings import RecordingSettings
 
@@ -201,6 +202,28 @@ class Library:
             self._wait(recorder, self._settings.stalled_s)
         return self.describe(recording_id)
 
+    def receive(self, announced_bytes: int = 0) -> Upload:
+        """Make room for a recording that is sent here.
+
+        Raises Problem ``too-large``, ``recording-not-stored``.
+        """
+        return Upload(self._directory, self._settings, _new_id(self._unix_s()), announced_bytes)
+
+    def take_in(self, upload: Upload, go_on: Callable[[], None]) -> dict[str, Any]:
+        """Make a recording of what was sent, and describe it; one at a time.
+
+        ``go_on``: called several times a second; what it raises ends it.
+        Raises Problem ``invalid-recording``, ``too-large``, ``recording-not-stored``,
+        ``shutting-down``.
+        """
+
+        def ask() -> None:
+            if self._closing.is_set():
+                raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
+            go_on()
+
+        return self.describe(upload.take_in(ask))
+
     # -- keeping -------------------------------------------------------------------------------
 
     def describe_all(self) -> list[dict[str, Any]]:
@@ -299,15 +322,12 @@ class Library:
         return len(self._descriptions), recorder and recorder.progress.frames
 
     def _recorder(self, options: RecordingOptions, started_s: float) -> Recorder:
-        moment = layout.utc(started_s)
-        recording_id = f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
-        name = options.name or names.default_name(moment)
+        recording_id = _new_id(started_s)
+        name = options.name or names.default_name(layout.utc(started_s))
         header = self._header(recording_id, name, started_s)
-        least = self._settings.min_free_bytes
         try:
             self._directory.make()
-            if (free := self._directory.free_bytes()) < least:
-                raise OSError(28, f"{free} bytes are free, {least} have to stay so")
+            self._directory.require_free(self._settings.min_free_bytes)
             path = self._directory.new(recording_id)
             writer = RecordingWriter(path, header, annotations=options.annotations)
         except OSError as error:
@@ -407,6 +427,10 @@ class Library:
         for part in parts:
             recovery.recover_all([part], stop=self._closing.is_set)
             self._recovering -= {id_of(part)}
+
+
+def _new_id(unix_s: float) -> str:
+    return f"{layout.utc(unix_s):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
 
 
 def _least(requested: Any, allowed: Any) -> Any:

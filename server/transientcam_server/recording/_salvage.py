@@ -1,8 +1,8 @@
 """Makes of an unfinished file a new one that any HDF5 reader opens, with all that is whole."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -66,20 +66,39 @@ def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
             annotations = layout.read_document(storage, "annotations")
     except Exception as error:  # h5py raises anything of a damaged file
         raise NotARecording(str(part), str(error)) from error
-    target.write_bytes(layout.image(header, annotations))
-    with open_to_write(target, "r+") as (file, disk), part.open("rb") as stream:
-        raw = file["raw"]
-        raw.resize(len(frames), 0)
-        for row, frame in enumerate(frames):
+    with part.open("rb") as stream:
+
+        def chunk(frame: SealedFrame) -> bytes:
             stream.seek(frame.offset)
-            chunk = stream.read(frame.size)
-            raw.id.write_direct_chunk((row, 0, 0, 0), chunk + seal(row, chunk, frame.values))
+            return stream.read(frame.size)
+
+        found = ((chunk(frame), frame.values) for frame in frames)
+        write_whole(target, layout.image(header, annotations), found)
+
+
+def write_whole(
+    target: Path, empty: bytes, frames: Iterable[tuple[bytes, Mapping[str, Any]]]
+) -> None:
+    """Write a recording with all its frames, and bring it to the disk.
+
+    ``empty``: as `layout.image` returns it.
+    ``frames``: the compressed chunk of each, and its values of all series.
+    Raises OSError if it cannot be written.
+    """
+    target.write_bytes(empty)
+    rows: list[Mapping[str, Any]] = []
+    with open_to_write(target, "r+") as (file, disk):
+        raw = file["raw"]
+        for row, (chunk, values) in enumerate(frames):
+            raw.resize(row + 1, 0)
+            raw.id.write_direct_chunk((row, 0, 0, 0), chunk + seal(row, chunk, values))
             disk.require_written()
+            rows.append(values)
         for name, (kind, _) in layout.SERIES.items():
-            file[name].resize(len(frames), 0)
-            file[name][:] = np.array([frame.values[name] for frame in frames], kind)
-        file[layout.ROW_AXIS].resize(len(frames), 0)
-        file[layout.ROW_AXIS][:] = np.arange(1, len(frames) + 1)
+            file[name].resize(len(rows), 0)
+            file[name][:] = np.array([values[name] for values in rows], kind)
+        file[layout.ROW_AXIS].resize(len(rows), 0)
+        file[layout.ROW_AXIS][:] = np.arange(1, len(rows) + 1)
 
 
 def _copy_blocks(dataset: swmr.Dataset, copy: swmr.File, rows: int, disk: DiskFile) -> None:

@@ -64,6 +64,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "GET /api/v1/preview.mjpeg",
         "GET /api/v1/recordings",
         "POST /api/v1/recordings",
+        "POST /api/v1/recordings/import",
         "GET /api/v1/recordings/{recording}",
         "PATCH /api/v1/recordings/{recording}",
         "DELETE /api/v1/recordings/{recording}",

@@ -471,3 +471,22 @@ def test_each_time_counts_for_itself() -> None:
     writing.pause_writing()
 
     assert [timer.cancelled for timer in connection.timers] == [True, False]
+
+
+def test_each_mebibyte_of_a_file_has_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[float | None] = []
+    expect_within = BoundedConnection._expect_within
+
+    def counted(connection: BoundedConnection, duration_s: float | None) -> None:
+        given.append(duration_s)
+        expect_within(connection, duration_s)
+
+    monkeypatch.setattr(BoundedConnection, "_expect_within", counted)
+    body_s = 77.0
+    with limited(body_s=body_s) as served:
+        answer = httpx.post(
+            f"{served.url}/api/v1/calibrations/import", content=bytes(7 * 2**19), timeout=PATIENCE_S
+        )
+
+    assert answer.status_code == 422
+    assert given.count(body_s) == 1 + 3

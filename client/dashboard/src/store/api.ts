@@ -53,6 +53,8 @@ interface RequestDetails<Body = unknown> {
   /** Goes out even if the page is closed meanwhile. */
   readonly keepalive?: boolean;
   readonly headers?: Readonly<Record<string, string>>;
+  /** Called with the share of the body that has been sent, 0 to 1. */
+  readonly onSent?: (share: number) => void;
 }
 
 /** What was read, and the tag of its version, to change just this one. */
@@ -75,6 +77,7 @@ export class Api {
   constructor(
     fetcher: Fetch = (input, init) => fetch(input, init),
     readonly credentials = new Credentials(),
+    private readonly fetchTelling: (onSent: (share: number) => void) => Fetch = byXMLHttpRequest,
   ) {
     this.#fetch = fetcher;
   }
@@ -122,10 +125,11 @@ export class Api {
     throw new RequestError(problem);
   }
 
-  async #ask(method: string, path: string, { body, signal, keepalive, headers }: RequestDetails): Promise<Response> {
+  async #ask(method: string, path: string, { body, signal, keepalive, headers, onSent }: RequestDetails): Promise<Response> {
     const raw = body instanceof Blob;
     try {
-      return await this.#fetch(`api/v1${path}`, {
+      const fetcher = onSent === undefined ? this.#fetch : this.fetchTelling(onSent);
+      return await fetcher(`api/v1${path}`, {
         method,
         headers: {
           ...this.credentials.headers(method !== "GET"),
@@ -141,6 +145,22 @@ export class Api {
       throw new RequestError({ title: "The service cannot be reached." });
     }
   }
+}
+
+/** Fetches what says how much of its body has been sent, as `fetch` does not. */
+function byXMLHttpRequest(onSent: (share: number) => void): Fetch {
+  return (address, { method = "GET", headers = {}, body, signal } = {}) =>
+    new Promise((resolve, reject) => {
+      const request = new XMLHttpRequest();
+      request.open(method, address as string);
+      for (const [name, value] of Object.entries(headers)) request.setRequestHeader(name, value);
+      request.upload.onprogress = ({ loaded, total }) => onSent(loaded / total);
+      request.onload = () => resolve(new Response(request.responseText, request));
+      request.onerror = () => reject(new TypeError("it was not answered"));
+      request.onabort = () => reject(new DOMException("it was given up", "AbortError"));
+      signal?.addEventListener("abort", () => request.abort());
+      request.send(body as Blob);
+    });
 }
 
 export function recordingPath(id: string): string {

@@ -1,6 +1,6 @@
 import { effect, signal, untracked } from "@preact/signals";
 import type { RecordingDocument, RecordingRequest, RecordingsDocument } from "../stream/documents";
-import { type Api, refusalIn } from "./api";
+import { type Api, RequestError, refusalIn } from "./api";
 import { Known } from "./known";
 
 /** How often one that runs is looked at. */
@@ -15,6 +15,9 @@ export const ORDERS = { "-started_s": "newest first", started_s: "oldest first",
 /** How many more are listed at a time. */
 export const PAGE = 50;
 
+/** A file on its way: the share of it that was sent, 0 to 1. */
+type Sending = Readonly<{ name: string; share: number; cancel: () => void }>;
+
 /** The recordings of the service that are looked for, as the page last saw them. */
 export class Recordings extends Known<RecordingsDocument> {
   /** The one that runs, whether it is looked for or not; null while none does. */
@@ -24,6 +27,8 @@ export class Recordings extends Known<RecordingsDocument> {
   readonly tag = signal("");
   readonly order = signal<keyof typeof ORDERS>("-started_s");
   readonly limit = signal(PAGE);
+  /** The file that is being sent; null while none is. */
+  readonly sending = signal<Sending | null>(null);
   #asked = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
@@ -44,6 +49,23 @@ export class Recordings extends Known<RecordingsDocument> {
 
   start(wanted: RecordingRequest): Promise<RecordingDocument> {
     return this.after(this.api.ask("POST /recordings", { body: wanted }));
+  }
+
+  /** Sends the file of a recording, which the service keeps. */
+  async send(file: Blob & Readonly<{ name: string }>): Promise<RecordingDocument> {
+    if (this.sending.peek() !== null) throw new RequestError({ detail: `${file.name} was not sent: another file is on its way.` });
+    const cancelling = new AbortController();
+    const cancel = (): void => cancelling.abort();
+    const onSent = (share: number): void => void (this.sending.value = { name: file.name, share, cancel });
+    onSent(0);
+    try {
+      return await this.after(this.api.ask("POST /recordings/import", { body: file, signal: cancelling.signal, onSent }));
+    } catch (error) {
+      if (cancelling.signal.aborted) throw new RequestError({ detail: `${file.name} was not sent: you cancelled it.` });
+      throw error;
+    } finally {
+      this.sending.value = null;
+    }
   }
 
   /** Keeps what the service still holds of the last seconds. */

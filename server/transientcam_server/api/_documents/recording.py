@@ -72,6 +72,8 @@ class RecordingLimitsDocument(Document):
     max_bytes: int | None = None
     min_free_bytes: int
     """What the disk keeps."""
+    max_upload_bytes: int
+    """No recording that is sent here is larger."""
 
 
 class RecordingTotalsDocument(Document):

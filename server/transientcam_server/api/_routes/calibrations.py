@@ -2,12 +2,10 @@
 
 import asyncio
 import time
-from pathlib import Path as FilePath
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Request, Response, status
 from fastapi.responses import FileResponse
-from starlette.requests import ClientDisconnect
 
 from transientcam_server.api import _downloads as downloads
 from transientcam_server.api._auth import Role
@@ -28,8 +26,9 @@ from transientcam_server.api._documents.calibration import (
 from transientcam_server.api._documents.job import JobDocument
 from transientcam_server.api._job_answers import ACCEPTED, accepted
 from transientcam_server.api._problems import documented
+from transientcam_server.api._uploads import body_of, received
 from transientcam_server.camera import CalibrationOptions, Drift, StoredCalibration
-from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors import kinds
 from transientcam_server.imaging import to_document
 from transientcam_server.service import Service
 
@@ -37,7 +36,6 @@ router = APIRouter(tags=["calibrations"])
 
 IMPORT: Final = "/calibrations/import"
 _CALIBRATED: Final = "Moments are calibrated"
-_PIECE_BYTES: Final = 1024 * 1024
 NPZ: Final = "application/octet-stream"
 _Calibration = Annotated[
     str,
@@ -47,17 +45,6 @@ _Calibration = Annotated[
         examples=["SIM-prototype-0-3f9c2a71b04e"],
     ),
 ]
-_FILE: Final[dict[str, Any]] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            NPZ: {
-                "schema": {"type": "string", "format": "binary"},
-                "examples": {"npz": {"summary": "How an .npz begins", "value": "PK\u0003\u0004"}},
-            }
-        },
-    }
-}
 
 
 @router.get("/calibrations", summary="All calibrations")
@@ -151,7 +138,7 @@ async def restore_calibration(service: ServiceOf) -> ActiveDocument:
     IMPORT,
     status_code=status.HTTP_201_CREATED,
     summary="Take a calibration in",
-    openapi_extra=_FILE,
+    openapi_extra=body_of(NPZ, "PK\u0003\u0004"),
     responses=documented(kinds.TOO_LARGE, kinds.INVALID_CALIBRATION, kinds.CALIBRATION_NOT_STORED),
 )
 @needs(Role.OPERATOR, lease=False)  # no frame is calibrated by it yet
@@ -163,12 +150,12 @@ async def import_calibration(service: ServiceOf, request: Request) -> Calibratio
     store = service.calibrations.store
     part = await asyncio.to_thread(store.new_part)
     try:
-        await _receive(request, part, limit=service.settings.calibrations.max_bytes)
+        with part.open("wb") as file:
+            async for piece in received(request, limit=service.settings.calibrations.max_bytes):
+                await asyncio.to_thread(file.write, piece)
         stored = await asyncio.to_thread(store.import_file, part)
     except OSError as error:
         raise store.not_stored(error) from error
-    except ClientDisconnect as error:
-        raise Problem(kinds.BAD_REQUEST, "The body ended early.") from error
     finally:
         await asyncio.to_thread(part.unlink, missing_ok=True)
     return _document(service, stored, None)
@@ -218,21 +205,6 @@ async def read_calibration_file(
         media_type=NPZ,
         filename=f"{stored.id}.npz",
     )
-
-
-async def _receive(request: Request, part: FilePath, *, limit: int) -> None:
-    received, waiting = 0, bytearray()
-    with part.open("wb") as file:
-        async for piece in request.stream():
-            received += len(piece)
-            if received > limit:
-                detail = f"The body is longer than {limit} bytes."
-                raise Problem(kinds.TOO_LARGE, detail, field="body", limit=limit)
-            waiting += piece
-            if len(waiting) >= _PIECE_BYTES:
-                await asyncio.to_thread(file.write, bytes(waiting))
-                waiting.clear()
-        await asyncio.to_thread(file.write, bytes(waiting))
 
 
 def _active(service: Service) -> ActiveDocument:

@@ -1,8 +1,9 @@
 """Recordings: start one, stop it, look through them, take them home."""
 
+import asyncio
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Path, Query, status
+from fastapi import APIRouter, Path, Query, Request, status
 from fastapi.responses import FileResponse
 
 from transientcam_server.api import _downloads as downloads
@@ -17,12 +18,16 @@ from transientcam_server.api._documents.recording import (
     RecordingsDocument,
     document,
 )
+from transientcam_server.api._planned import for_request
 from transientcam_server.api._problems import documented
+from transientcam_server.api._uploads import body_of, received
 from transientcam_server.errors import kinds
+from transientcam_server.planning import Progress
 from transientcam_server.recording import Limits, Order, RecordingOptions, select
 
 router = APIRouter(tags=["recordings"])
 
+IMPORT: Final = "/recordings/import"
 HDF5: Final = "application/x-hdf5"
 _OF_ONE: Final = (kinds.UNKNOWN_RECORDING, kinds.DISK_STALLED)
 _CHANGED: Final = (*_OF_ONE, kinds.RECORDING_UNFINISHED, kinds.RECORDING_NOT_STORED)
@@ -90,6 +95,41 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
     limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=count)
     order = RecordingOptions(name=wanted.name, limits=limits, annotations=wanted.annotations)
     return document(await service.record(order, history_s=wanted.history_s, frame=wanted.frame))
+
+
+@router.post(
+    IMPORT,
+    status_code=status.HTTP_201_CREATED,
+    summary="Take a recording in",
+    openapi_extra=body_of(HDF5, "\x89HDF\r\n\x1a\n"),
+    responses=documented(
+        kinds.TOO_LARGE, kinds.INVALID_RECORDING, kinds.RECORDING_NOT_STORED, kinds.DISK_STALLED
+    ),
+)
+@needs(Role.OPERATOR, lease=False)
+async def import_recording(service: ServiceOf, request: Request) -> RecordingDocument:
+    """Keep the recording that is sent as body, under its id, or a new one where that is taken.
+
+    One that is here already stays as it is. A process of its own reads it and writes it anew, with
+    all its frames as they were captured. A client that leaves before the answer ends it, and
+    nothing is kept.
+    """
+    library = service.recordings
+    length = request.headers.get("content-length", "")
+    upload = await library.disk.run(library.receive, int(length) if length.isdecimal() else 0)
+
+    async def take_in(progress: Progress) -> RecordingDocument:
+        async with service.taking_in:
+            # not on a thread of the disk, which would be stalled
+            return document(await asyncio.to_thread(library.take_in, upload, progress))
+
+    try:
+        async for piece in received(request, limit=service.settings.recordings.max_upload_bytes):
+            await library.disk.run(upload.write, piece)
+        return await for_request(request, take_in)
+    finally:
+        closed = asyncio.wrap_future(library.disk.submit(upload.close))
+        await asyncio.wait((closed,), timeout=service.settings.recordings.stalled_s)
 
 
 @router.get("/recordings/{recording}", summary="A recording", responses=documented(*_OF_ONE))

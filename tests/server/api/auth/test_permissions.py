@@ -36,6 +36,7 @@ KINDS: Final[dict[str, Kind]] = {
     "POST /series/jobs": "light",
     "PUT /reconstruction": "change",
     "POST /recordings": "change",
+    "POST /recordings/import": "change",
     "PATCH /recordings/{recording}": "change",
     "DELETE /recordings/{recording}": "delete",
     "POST /recordings/{recording}/stop": "change",

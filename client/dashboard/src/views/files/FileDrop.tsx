@@ -34,11 +34,22 @@ export function FileDrop() {
     window.addEventListener("drop", onDrop, { signal });
     return () => end.abort();
   }, [store, over]);
-  if (!over.value) return null;
+  const sending = store.recordings.sending.value;
   return (
-    <div class="file-drop" aria-hidden="true">
-      <p>A scene (.toml) to put the camera before, a recording (.h5) of this service to show, a calibration (.npz) to take in</p>
-    </div>
+    <>
+      {over.value && (
+        <div class="file-drop" aria-hidden="true">
+          <p>A scene (.toml) to put the camera before, a recording (.h5) to show, a calibration (.npz) to take in</p>
+        </div>
+      )}
+      {sending !== null && (
+        <div class="file-sent" role="status">
+          <span>{sending.share < 1 ? `Sending ${sending.name}` : `The service reads ${sending.name}`}</span>
+          <progress value={sending.share} aria-label="Sent" />
+          <Button onClick={sending.cancel}>Cancel</Button>
+        </div>
+      )}
+    </>
   );
 }
 

@@ -1,7 +1,7 @@
 /** Files that a user gives to the page: a scene, a recording, a calibration. */
+import { engineering } from "../../scales/format";
 import { RequestError } from "../../store/api";
 import type { Store } from "../../store/store";
-import type { RecordingDocument } from "../../stream/documents";
 
 /** Characters of a scene that the service takes. */
 const LONGEST_SCENE = 65_536;
@@ -36,31 +36,23 @@ const OPENERS: Readonly<Record<string, (store: Store, file: OpenedFile) => Promi
   ".h5": async (store, file) => {
     const [id = ""] = /\d{8}T\d{6}Z-[0-9a-f]+/.exec(file.name) ?? [];
     const listed = await store.api.ask("GET /recordings", { at: `/recordings?limit=1000&search=${id}` });
-    const found = recordingIn(listed.recordings, file);
-    if (found === null)
+    // a download is named by its id
+    const found = id === "" ? undefined : listed.recordings.find((recording) => recording.id === id);
+    const { max_upload_bytes } = listed.limits;
+    if (found === undefined && file.size > max_upload_bytes)
       throw new RequestError({
-        detail: `The service has no recording like ${file.name}. A page cannot bring one to it: put the file into the directory of the recordings, or open it with "transientcam replay".`,
+        detail: `${file.name} has ${engineering(file.size, "B")}, and ${engineering(max_upload_bytes, "B")} may be sent. Put it into the directory of the recordings, or open it with "transientcam replay".`,
       });
-    await store.replay.open(found.id);
+    const shown = found ?? (await store.recordings.send(file));
+    await store.replay.open(shown.id);
     store.replay.toggle();
-    return `${found.name} is shown from the service's recordings.`;
+    return `${shown.name} is ${found === undefined ? "one of the service's recordings now" : "shown from the service's recordings"}.`;
   },
   ".npz": async (store, file) => {
     await store.calibrations.take(file);
     return `The calibration ${file.name} was taken in; it can be used now.`;
   },
 };
-
-/** The recording that a file is of: by the name it was downloaded under, else by its size, where no other is as large. */
-export function recordingIn(
-  recordings: readonly RecordingDocument[],
-  { name, size }: Pick<OpenedFile, "name" | "size">,
-): RecordingDocument | null {
-  const named = recordings.find(({ id }) => name.includes(id));
-  if (named !== undefined) return named;
-  const alike = recordings.filter(({ size_bytes }) => size_bytes === size);
-  return alike.length === 1 ? alike[0] : null;
-}
 
 /** Lets the user choose a file, by default of any kind that can be opened, and opens it, or has it taken otherwise. */
 export function chooseFile(

@@ -39,7 +39,7 @@ export function RecordingsView() {
               {engineering(known.free_bytes, "B")} free
             </span>
           )}
-          <OpenButton kind=".h5" title="Show a recording of this service by the file that was downloaded" />
+          <OpenButton kind=".h5" title="Show a recording by its file; the service takes one in that it does not have" />
         </>
       }
     >
