@@ -5,6 +5,8 @@ from typing import Any
 import schemathesis
 
 _WAIT_S = "0.01"
+# a recording is bytes for schemathesis, too
+schemathesis.serializer.alias("application/x-hdf5", "application/octet-stream")
 
 
 @schemathesis.hook

@@ -178,7 +178,12 @@ def test_nothing_is_made_on_the_disk_before_the_first_recording(
 
     assert document == {
         "directory": str(directory),
-        "limits": {"max_duration_s": None, "max_bytes": None, "min_free_bytes": 0},
+        "limits": {
+            "max_duration_s": None,
+            "max_bytes": None,
+            "min_free_bytes": 0,
+            "max_upload_bytes": 2 * 1024**3,
+        },
         "free_bytes": None,
         "active": None,
         "recordings": [],
