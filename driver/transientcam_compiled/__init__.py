@@ -9,7 +9,7 @@ imports no compiler: numba is imported by the thread, or the `ChildProcess`, tha
 for its results.
 """
 
-from transientcam_compiled._cache import Cache
+from transientcam_compiled._cache import Cache, NotKept, only_from_cache
 from transientcam_compiled._kernels import THREAD, Kernels
 from transientcam_compiled._memory import empty
 from transientcam_compiled._process import ChildProcess, ProcessEnded, Tell, python

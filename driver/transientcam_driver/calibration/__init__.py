@@ -1,6 +1,10 @@
 """Calibration measurements: how a camera captures one, and the file that keeps it."""
 
-from transientcam_driver.calibration._capture import DEFAULT_TAKES, capture_calibration
+from transientcam_driver.calibration._capture import (
+    DEFAULT_TAKES,
+    capture_calibration,
+    mean_of_takes,
+)
 from transientcam_driver.calibration._drift import TemperatureDrift
 from transientcam_driver.calibration._file import (
     DEVICE_FIELDS,

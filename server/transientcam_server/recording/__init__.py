@@ -24,6 +24,7 @@ from transientcam_server.recording._product_stores import (
     EVERY_CHUNK,
     FORMAT,
     METADATA,
+    ProductStore,
     ProductStores,
 )
 from transientcam_server.recording._reader import Recording

@@ -6,6 +6,6 @@ firmware speaks the protocol. What the sensor sees comes from a renderer, the si
 
 from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
 from transientcam_simulation.emulated._open_usb.faults import Fault, PendingFaults
-from transientcam_simulation.emulated._open_usb.firmware import Firmware
+from transientcam_simulation.emulated._open_usb.firmware import Firmware, Renderer
 from transientcam_simulation.emulated._open_usb.prototype import prototype
 from transientcam_simulation.emulated._open_usb.usb_device import EmulatedDevice

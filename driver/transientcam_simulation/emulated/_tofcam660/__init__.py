@@ -4,4 +4,5 @@
 """
 
 from transientcam_simulation.emulated._tofcam660.build import build_tofcam660
+from transientcam_simulation.emulated._tofcam660.firmware import EmulatedFirmware
 from transientcam_simulation.emulated._tofcam660.network import EmulatedTofcam660
