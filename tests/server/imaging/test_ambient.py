@@ -68,7 +68,9 @@ def test_the_stated_deviation_is_that_of_captures_with_and_without_sun(
     stated_m = np.stack([_of(each).range_scatter_m() for each in computed])
     stated_m = stated_m.reshape(ranges_m.shape)  # of each pixel: averages are of 1 to 69
     apart = np.abs(np.diff(ranges_m, axis=0)) / np.hypot(stated_m[1:], stated_m[:-1])
-    assert np.median(apart) / 0.67449 == pytest.approx(1.0, rel=0.1)  # of a normal variable
+    # a frame chooses its neighbours: most pixels differ by less, some by more
+    assert np.sqrt(np.mean(apart**2)) == pytest.approx(1.0, rel=0.1)
+    assert np.mean(apart > 3) < 0.008
     assert computed[0].range_noise is not None
     assert computed[0].range_noise["median"] == pytest.approx(np.median(stated_m[0]), rel=0.02)
     meta = frame_meta(1, frames[0], recipe, computed[0], 0.1)

@@ -130,8 +130,8 @@ def test_one_pixel_in_sixteen_stands_for_those_around_it() -> None:
     assert (one["every_px"], other["every_px"]) == (1, 4)
     for name in ("range_error_m", "range_std_m"):
         assert other[name] == pytest.approx(one[name], rel=0.25)
-    # pixels further apart share no smoothed noise, whose rest their median takes for bias
-    assert other["range_bias_m"] == pytest.approx(one["range_bias_m"], rel=0.5)
+    # pixels further apart share less averaged noise, whose rest their median takes for bias
+    assert other["range_bias_m"] == pytest.approx(one["range_bias_m"], rel=0.6)
 
 
 def test_all_pixels_are_predicted_as_soon_as_that_is_quick() -> None:
