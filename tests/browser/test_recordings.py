@@ -234,6 +234,7 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
         expected = map_colours(recorded(served, recording, frame, "range"), low, high, "viridis")
         np.testing.assert_allclose(map_pixels(page).astype(int), expected, atol=6)
     expect(page.locator("[data-field=replay-frame]")).to_have_text("4")
+    expect(page.locator("[data-field=subject]")).to_contain_text("recording ")
     # what the views show of light and of the pixel is of this frame, too
     coefficients = page.evaluate(
         "() => [...transientcam.store.frames.of('coefficients').peek().values.slice(0, 500)]"
@@ -251,6 +252,7 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
     page.get_by_role("button", name="Back to live").click()
     expect(page.locator(".replay")).to_have_count(0)
     expect(page.locator("[data-field=state]")).to_have_text(LIVE)
+    expect(page.locator("[data-field=subject]")).to_contain_text("simulated ")
     newest = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
     page.wait_for_function(
         "(newest) => document.querySelector('.panel-map .stage canvas').dataset.frame > newest",

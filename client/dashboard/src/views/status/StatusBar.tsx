@@ -199,13 +199,16 @@ function Performance() {
 
 /** What one looks at: the scene of a simulated camera, else the camera. */
 function Subject() {
-  const { camera, simulation } = useStore();
+  const { camera, simulation, replay } = useStore();
+  const recording = replay.active.value ? replay.recording.value : null;
   if (camera.value === null) return null;
   const { capabilities, simulated } = camera.value;
   const scene = simulation.world.value?.scene;
+  const live = simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities.model);
+  const serial = String((recording?.camera ?? capabilities).serial);
   return (
-    <span class="camera-name quiet clipped roomy" title={`Serial number ${String(capabilities.serial)}`} data-field="subject">
-      {simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities.model)}
+    <span class="camera-name quiet clipped roomy" title={`Serial number ${serial}`} data-field="subject">
+      {recording === null ? live : `recording ${recording.name}`}
     </span>
   );
 }
