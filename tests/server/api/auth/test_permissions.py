@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 import httpx
 import pytest
 
+from tests.server.contract import client_of
 from tests.serving import Served, serving
 from transientcam_server.api import TokenFile
 from transientcam_server.api._auth import Role
@@ -84,6 +85,12 @@ def daemon(file: TokenFile, headers: dict[str, dict[str, str]]) -> Iterator[Serv
     with serving("sim:wall?noise=off", require_token=True, tokens_file=file.path) as served:
         served.start_all_workers()
         yield served
+
+
+@pytest.fixture(scope="module")
+def http(daemon: Served) -> Iterator[httpx.Client]:
+    with client_of(daemon) as client:
+        yield client
 
 
 def operations(daemon: Served) -> Iterator[tuple[str, str]]:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray
 
+from tests.server.contract import client_of
 from tests.server.recording.made import record
 from tests.serving import Served, serving
 from transientcam.cli import run
@@ -37,6 +38,12 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def daemon(directory: Path) -> Iterator[Served]:
     with serving(recordings={"directory": directory}) as served:
         yield served
+
+
+@pytest.fixture(scope="module")
+def http(daemon: Served) -> Iterator[httpx.Client]:
+    with client_of(daemon) as client:
+        yield client
 
 
 def begun(store: Path) -> Path:

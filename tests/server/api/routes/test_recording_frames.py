@@ -12,6 +12,7 @@ import httpx
 import numpy as np
 import pytest
 
+from tests.server.contract import client_of
 from tests.server.recording.made import record
 from tests.serving import Served, serving
 from tests.waiting import wait_until
@@ -32,6 +33,12 @@ def daemon(directory: Path) -> Iterator[Served]:
     with serving(recordings=kept, history=history) as served:
         served.start_all_workers()
         yield served
+
+
+@pytest.fixture(scope="module")
+def http(daemon: Served) -> Iterator[httpx.Client]:
+    with client_of(daemon) as client:
+        yield client
 
 
 @pytest.fixture(scope="module")

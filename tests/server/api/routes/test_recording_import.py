@@ -9,6 +9,7 @@ import httpx
 import numpy as np
 import pytest
 
+from tests.server.contract import client_of
 from tests.server.recording import children
 from tests.server.recording.made import assert_same, frame, record
 from tests.serving import Served, serving
@@ -31,6 +32,12 @@ def daemon(directory: Path) -> Iterator[Served]:
     with serving(recordings=kept) as served:
         served.start_all_workers()
         yield served
+
+
+@pytest.fixture(scope="module")
+def http(daemon: Served) -> Iterator[httpx.Client]:
+    with client_of(daemon) as client:
+        yield client
 
 
 def scratch(directory: Path) -> list[str]:

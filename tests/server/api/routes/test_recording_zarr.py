@@ -12,6 +12,7 @@ import xarray
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from tests.server.contract import client_of
 from tests.server.recording.made import record
 from tests.serving import Served, serving
 from tests.waiting import wait_until
@@ -51,6 +52,12 @@ def daemon(directory: Path) -> Iterator[Served]:
     kept = {"directory": directory, "min_free_bytes": 0}
     with serving(prepare=note_requests, recordings=kept) as served:
         yield served
+
+
+@pytest.fixture(scope="module")
+def http(daemon: Served) -> Iterator[httpx.Client]:
+    with client_of(daemon) as client:
+        yield client
 
 
 def test_xarray_opens_all_that_is_in_the_file_and_reads_what_is_indexed(
