@@ -1,7 +1,7 @@
 """What the process that reads a stranger's file may do instead, for tests; light to import."""
 
 import os
-import time
+import signal
 from pathlib import Path
 
 
@@ -20,4 +20,4 @@ def hang(sent: Path, *_: object) -> None:
     begun = sent.with_name("hanging.tmp")
     begun.write_text(str(os.getpid()))
     begun.rename(sent.with_name("hanging"))
-    time.sleep(3600.0)
+    signal.pause()
