@@ -63,6 +63,15 @@ describe("an address", () => {
     expect([store.mapProduct.value, store.selected.value]).toEqual(["range", { x: 7, y: 8 }]);
   });
 
+  test("that is gone to is followed, though another was about to be written", () => {
+    const { store, target } = page();
+    store.mapProduct.value = "indirect";
+    target.location.hash = "#map=direct"; // its event is still to come
+    vi.advanceTimersByTime(1000);
+    target.goto("#map=direct");
+    expect(store.mapProduct.value).toBe("direct");
+  });
+
   test("has the second map while it is shown", () => {
     const { store, target } = page("#map=direct&map2=validity&layout=1:map.1,second-map.1");
     expect(store.secondMapProduct.value).toBe("validity");

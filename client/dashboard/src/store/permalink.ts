@@ -27,7 +27,7 @@ export async function copyLink(target: Window, store: Store, kept = ""): Promise
     store.events.tell(`The link was copied: it shows ${what}, with pins, zoom and colours.`, "good");
   } catch {
     // Refused, or not over https.
-    store.status.unreadable.value = `The link to what is shown: ${href}`;
+    store.status.failed.value = `The link to what is shown: ${href}`;
   }
 }
 
@@ -39,10 +39,12 @@ export function keepAddress(target: Window, store: Store): void {
   const { settings } = store;
   settings.add(timePart(store));
   settings.add(recordingPart(store));
-  let written = target.location.hash;
-  settings.follow(written);
+  let known = target.location.hash;
+  settings.follow(known);
   target.addEventListener("hashchange", () => {
-    if (target.location.hash !== written) settings.follow(target.location.hash);
+    if (target.location.hash === known) return;
+    known = target.location.hash;
+    settings.follow(known);
   });
   let timer: ReturnType<typeof setTimeout> | undefined;
   effect(() => {
@@ -51,9 +53,10 @@ export function keepAddress(target: Window, store: Store): void {
     // A time that waits for its period must not be forgotten meanwhile.
     if (store.sequence.value === null) return;
     timer = setTimeout(() => {
-      if (hash === written) return;
-      written = hash;
+      // Another address was gone to, and its event is still to come: it must not be overwritten.
+      if (hash === known || target.location.hash !== known) return;
       target.history.replaceState(target.history.state, "", hash);
+      known = target.location.hash;
     }, PAUSE_MS);
   });
 }
@@ -113,7 +116,7 @@ async function open(store: Store, recording: string, frame: number | undefined):
       await open(store, recording, frame);
       return;
     }
-    status.unreadable.value = `The recording of this link cannot be shown: ${message}`;
+    status.failed.value = `The recording of this link cannot be shown: ${message}`;
   }
 }
 

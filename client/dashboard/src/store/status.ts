@@ -64,7 +64,10 @@ export class Status {
   /** Time the service took to bring the frame on screen, with all its products, into the form it was sent in. */
   readonly encode_s = signal<number | null>(null);
   readonly lostImages = signal(0);
+  /** What this session of the service would not do or sent unread; a new one starts without. */
   readonly unreadable = signal<string | null>(null);
+  /** What the page itself could not do; it stays until it was read. */
+  readonly failed = signal<string | null>(null);
   readonly #drops = signal<ReadonlyMap<number, number>>(new Map());
   /** Those of subscriptions before the present one. */
   readonly #droppedBefore = signal(0);

@@ -57,10 +57,11 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
       </Alert>
     );
   }
-  if (status.unreadable.value === null) return null;
+  const message = status.failed.value === null ? status.unreadable : status.failed;
+  if (message.value === null) return null;
   return (
-    <Alert mild about="message" word="Dismiss" onClick={() => (status.unreadable.value = null)}>
-      {status.unreadable.value}
+    <Alert mild about="message" word="Dismiss" onClick={() => (message.value = null)}>
+      {message.value}
     </Alert>
   );
 }

@@ -38,7 +38,7 @@ function Capture() {
   const task = useTask();
   const running = store.status.running.value;
   const run = async (words: string, work: () => Promise<unknown>): Promise<void> => {
-    if (!(await task.run(words, work))) store.status.unreadable.value = task.refusal.peek();
+    if (!(await task.run(words, work))) store.status.failed.value = task.refusal.peek();
   };
   const toggle = (): Promise<void> =>
     run("Switching", async () => {
