@@ -253,7 +253,7 @@ def test_a_diffuser_may_be_spelt_as_it_was_before(spelling: str, daemon: _Daemon
 
 def test_parts_of_the_simulation_that_are_not_given_are_left_out(daemon: _Daemon) -> None:
     with Camera(_URL, transport=httpx.MockTransport(daemon)) as camera:
-        for parts in ({"scene": "corner"}, {"diffusor": False}, {"effects": {"blur": "on"}}):
+        for parts in ({"scene": "corner"}, {"diffusor": False}, {"effects": {"fog": "on"}}):
             camera.simulate(**parts)
             assert daemon.last == ("PUT", "/api/v1/simulation", "", parts)
 

@@ -25,6 +25,7 @@ from transientcam_simulation.effects._in_scene import (
     Gloss,
     MirrorPaths,
     MixedPixels,
+    MotionBlur,
     MotionDuringSequence,
     Scattering,
 )
@@ -57,8 +58,8 @@ NOISE = (ShotNoise, ReadNoise)
 
 EFFECTS: tuple[type[Effect], ...] = (
     Distortion, MirrorPaths, Gloss, DiffuseInterreflection, Scattering, MixedPixels,
-    MotionDuringSequence, ModulationHarmonics, AmbientLight, AmplitudeRollOff, LensScatter,
-    Vignetting, PixelPattern, DarkCurrentElectrons, ThermalDrift, SynchronisationOutliers,
-    Saturation, *NOISE, Quantisation,
+    MotionDuringSequence, MotionBlur, ModulationHarmonics, AmbientLight, AmplitudeRollOff,
+    LensScatter, Vignetting, PixelPattern, DarkCurrentElectrons, ThermalDrift,
+    SynchronisationOutliers, Saturation, *NOISE, Quantisation,
 )  # fmt: skip
 """In the order in which they happen."""

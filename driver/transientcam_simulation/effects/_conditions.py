@@ -133,7 +133,8 @@ class Conditions:
         """Return how far an effect of light moves the moments, by glimpse; empty if nowhere."""
         if self.facts is None:
             return ()
-        return self.facts.changes(effect, self.frequencies_hz, during_s=self.sequence_s)
+        during_s = self.sequence.exposure_s if effect == "blur" else self.sequence_s
+        return self.facts.changes(effect, self.frequencies_hz, during_s=during_s)
 
 
 @lru_cache(maxsize=64)

@@ -66,13 +66,18 @@ class Facts(Protocol):
         """Names of surfaces that move and may be thinner than a pixel."""
         ...
 
+    @property
+    def pixels_per_s(self) -> float:
+        """Highest speed of any surface, in pixels."""
+        ...
+
     def changes(
         self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
     ) -> tuple[Values, ...]:
         """Return how far an effect moves each pixel's moments, at most, by glimpse.
 
-        ``during_s`` is the time from the first image of a sequence to the last. Empty where the
-        scene has nothing that the effect is about.
+        ``during_s`` is the time from the first image of a sequence to the last, and for "blur" that
+        of an exposure. Empty where the scene has nothing that the effect is about.
         """
         ...
 
@@ -81,9 +86,9 @@ class Facts(Protocol):
         ...
 
     def missing(
-        self, kind: str, frequencies_hz: tuple[float, ...], *, during_s: float
+        self, kind: str, frequencies_hz: tuple[float, ...]
     ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
-        """Return pixels, and how far moments lack light of a kind in an exposure, by time."""
+        """Return pixels, and how far moments lack light of a kind, by time."""
         ...
 
     def further_bounces(self, tolerance: float) -> int:

@@ -108,6 +108,33 @@ class MotionDuringSequence(_InGeometry):
         return conditions.pixels * _MOTION_COST_S_PER_PIXEL
 
 
+class MotionBlur(_InGeometry):
+    """An image is the mean over so many instants of its exposure; else it is its middle."""
+
+    name = "blur"
+    what = "what moves blurs while an image is exposed"
+    without = "nothing moves"
+    where = ""
+    instants: ClassVar[int] = 8
+    _least_pixels: ClassVar[float] = 0.5
+    """That anything moves in an exposure: light is not computed at closer places (`Steps`)."""
+
+    @classmethod
+    def called_for(cls, conditions: Conditions) -> Call:
+        """Where something moves so far that its edges pass pixels unevenly."""
+        call, facts = super().called_for(conditions), conditions.facts
+        if facts is None or not facts.pixels_per_s:
+            return call
+        moved = facts.pixels_per_s * conditions.sequence.exposure_s
+        reason = f"the fastest moves by {moved:.2g} pixels in an exposure"
+        return replace(call, called=call.called and moved > cls._least_pixels, reason=reason)
+
+    @classmethod
+    def cost_s(cls, conditions: Conditions) -> float:
+        """Return that of light at further times."""
+        return (cls.instants - 1) * conditions.pixels * _MOTION_COST_S_PER_PIXEL
+
+
 class DiffuseInterreflection(LightEffect):
     """A continuous tail of late light, by radiosity with times of flight."""
 

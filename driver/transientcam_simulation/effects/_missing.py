@@ -29,18 +29,16 @@ MISSING = [
         "it brings too much in {share} of the pixels",
         "coarse-patches | light that surfaces give each other, where it changes within a patch | "
         "patches are too coarse in {share} of the pixels; more transport.patches may help",
-        "blur | what moves blurs while an image is exposed | "
-        "{share} of the pixels change within an exposure",
     )
 ]
 
 
 def missing_calls(conditions: Conditions) -> Iterator[tuple[Missing, Call]]:
     """Judge those that the scene has anything for."""
-    facts, during_s = conditions.facts, conditions.sequence.exposure_s
+    facts = conditions.facts
     if facts is None:
         return
     for kind in MISSING:
-        glimpses, lacks = facts.missing(kind.name, conditions.frequencies_hz, during_s=during_s)
+        glimpses, lacks = facts.missing(kind.name, conditions.frequencies_hz)
         if any(each.any() for each in lacks):
             yield kind, weigh(replace(conditions, glimpses=glimpses), lacks, kind.reason)

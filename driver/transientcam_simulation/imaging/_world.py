@@ -25,6 +25,7 @@ from transientcam_simulation.effects import (
     LightPlanes,
     Missing,
     ModulationHarmonics,
+    MotionBlur,
     MotionDuringSequence,
     PlaneEffect,
     Shot,
@@ -43,6 +44,7 @@ _AMBIENT_C = 25.0
 class _Plan:
     """Everything that is the same for all images of a sequence.
 
+    ``instants``: of an exposure that an image is the mean over.
     ``trace`` returns ``views``, which may take seconds. ``time_s`` is that of the last image.
     ``quadratures`` are planes of ``view`` by harmonic, and ``canvases`` such planes over a
     background.
@@ -54,6 +56,7 @@ class _Plan:
     trace: Callable[[], Views]
     lens: Lens
     per_image: bool
+    instants: int
     waveform: ModulationHarmonics | None
     on_light: tuple[PlaneEffect, ...]
     on_shot: tuple[ShotEffect, ...]
@@ -135,6 +138,7 @@ class World:
         made = [effect(self._forced(effect, conditions)) for effect in built]
         lens = next((self._forced(e, conditions).lens for e in built if e is Distortion), PINHOLE)
         noise = replace(conditions.noise, white_e=conditions.white_e)
+        blurs = MotionBlur.name in of_light and self._scenery.moves
         self._plan = _Plan(
             sequence,
             {label.harmonic: label.frequency_hz for label in labels},
@@ -147,6 +151,7 @@ class World:
             ),
             lens,
             MotionDuringSequence.name in of_light,
+            MotionBlur.instants if blurs else 1,
             next((each for each in made if isinstance(each, ModulationHarmonics)), None),
             tuple(each for each in made if isinstance(each, PlaneEffect)),
             tuple(each for each in made if isinstance(each, ShotEffect)),
@@ -256,15 +261,19 @@ class World:
         turn_rad = label.phase_rad - 2 * np.pi * label.frequency_hz * shot.delay_s
         # the phasor of theta, turned back by light that is late or out of step
         out_of_step = np.conj(complex(shot.factor))
-        light = self._quadratures(plan, label.harmonic, time_s)
-        phasors = {k: complex(np.exp(1j * k * turn_rad)) * out_of_step for k, *_ in light.terms}
-        return light.at(phasors, illumination=label.illumination)
+        seen: list[NDArray[np.float32]] = []
+        for instant in range(plan.instants):
+            at_s = time_s + (instant + 0.5) / plan.instants * plan.sequence.exposure_s
+            light = self._quadratures(plan, label.harmonic, at_s)
+            phasors = {k: complex(np.exp(1j * k * turn_rad)) * out_of_step for k, *_ in light.terms}
+            seen.append(light.at(phasors, illumination=label.illumination))
+        plan.time_s = time_s + 0.5 * plan.sequence.exposure_s
+        return seen[0] if len(seen) == 1 else np.mean(seen, axis=0, dtype=np.float32)
 
     def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> Quadratures:
         """Planes of the images of a harmonic; computed again only where the scene moves."""
         ask()
         view = plan.views.at(time_s)
-        plan.time_s = time_s
         frequency_hz = plan.frequencies_hz[harmonic]
 
         def of(view: View, region: Region | None) -> Quadratures:

@@ -112,19 +112,15 @@ class SceneFacts:
         """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
         if effect == "interreflection":
             return self._further_light
+        if effect == "blur":
+            return self._blurred(frequencies_hz, during_s)
         key = effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0
         return self._found.get(key, lambda: self._changes(*key))
 
     def missing(
-        self, kind: str, frequencies_hz: tuple[float, ...], *, during_s: float
+        self, kind: str, frequencies_hz: tuple[float, ...]
     ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
         """Return some pixels, and how far their moments lack light of a kind, at most, by time."""
-        if kind == "blur":
-            # an image is an instant of its exposure; edges pass pixels by shares, not at once
-            pixel_s = 1 / max(self._fastest_pixels_per_s, 1e-9)
-            over_s = max(during_s, min(pixel_s, self._period_s / _TIMES))
-            changes = self.changes("motion", frequencies_hz, during_s=over_s)
-            return self.glimpses, tuple(during_s / over_s / 2 * each for each in changes)
         if kind == "coarse-patches" and self._scene.moves:
             return (), ()
         ways, glimpses = self._sampled
@@ -199,7 +195,7 @@ class SceneFacts:
         contrast is then found over a longer time, and counts by the part of a pixel that it moves.
         """
         apart = self._apart([self._later(part * during_s) for part in (0.5, 1.0)], frequencies_hz)
-        moved = self._fastest_pixels_per_s * during_s
+        moved = self.pixels_per_s * during_s
         if not 0 < moved < self._stride:
             return apart
         longer_s = min(during_s * self._stride / moved, self._period_s / _TIMES)
@@ -208,6 +204,22 @@ class SceneFacts:
             np.maximum(one, min(1.0, moved) * other)
             for one, other in zip(apart, swept, strict=True)
         )
+
+    def _blurred(self, frequencies_hz: tuple[float, ...], during_s: float) -> tuple[Values, ...]:
+        """Return how far the mean over an exposure is from the light at its middle.
+
+        An edge that moves evenly within a pixel has its mean share there in the middle; one that
+        only then comes into it differs by an eighth of the pixels that it moves, up to half. This
+        is the root mean square over the places where an edge may be.
+        """
+        moved = self.pixels_per_s * during_s
+        if not moved:
+            return ()
+        over_s = max(during_s, min(during_s / moved, self._period_s / _TIMES))  # the whole contrast
+        part = (1 - 1 / moved) / 2 if moved > 2 else max(moved, 1.0) / 8 * during_s / over_s
+        part *= math.sqrt(min(moved, 1.0) / 5)
+        changes = self.changes("motion", frequencies_hz, during_s=over_s)
+        return tuple(part * each for each in changes)
 
     def _later(self, by_s: float) -> list[_SampledView]:
         return [self._look(self._scene.at(t + by_s), self._camera) for t in self._times_s]
@@ -246,7 +258,7 @@ class SceneFacts:
         return math.radians(self._camera.field_of_view_deg) / self._size[0]
 
     @cached_property
-    def _fastest_pixels_per_s(self) -> float:
+    def pixels_per_s(self) -> float:
         """Highest speed of any surface, at the place where it stands, in pixels."""
         speeds = [0.0]
         for each in self._scene.surfaces:

@@ -39,7 +39,7 @@ from transientcam_simulation.effects import (
 from transientcam_simulation.emulated import find_scene, world_of
 from transientcam_simulation.imaging import World
 from transientcam_simulation.light import GivenScenery
-from transientcam_simulation.scene import Motion, Rectangle, Surface
+from transientcam_simulation.scene import Motion, Rectangle, Scene, Surface
 
 SHAPE = (12, 16)
 EXPOSURE_S = 1e-3
@@ -521,6 +521,57 @@ def test_motion_counts_from_the_first_image_of_a_sequence_to_the_last() -> None:
     # 256 takes: 16 times less noise, and 256 times as far
     assert long.relative > 16 * short.relative
     assert long.called
+
+
+def passing_bar(speed_m_s: float) -> Scene:
+    """A bar that passes before a wall, some 0.02 rad across and 150 pixels a m away."""
+    scene = find_scene("wall")
+    bar = Rectangle.facing(np.array([0, 1.2, 0]), np.array([0, -1.0, 0]), size=(0.1, 0.5))
+    passes = Motion(np.array([[-0.3, 0, 0], [0.3, 0, 0]]), 0.6 / speed_m_s, "restart")
+    bars = Surface("bar", "diffuse", bar, 0.9, motions=(passes,))
+    return replace(scene, surfaces=(*scene.surfaces, bars))
+
+
+@pytest.mark.parametrize("speed_m_s", [0.5, 2.0, 8.0])
+def test_an_image_of_what_moves_is_the_mean_over_its_exposure(speed_m_s: float) -> None:
+    sequence = Sequence(exposure_s=5e-3)
+    scene, label = passing_bar(speed_m_s), sequence.labels[2]
+
+    def world(blur: str) -> World:
+        effects = {"blur": blur, "motion": "on", "mixed-pixels": "on"}
+        of = world_of(replace(scene, effects=effects), width=61, height=20, readout_s=4e-3)
+        of.configure(sequence, sequence.labels)
+        return of
+
+    begun_s, instants = 0.3 / speed_m_s, 160
+    sharp = world("off")
+    offsets_s = ((np.arange(instants) + 0.5) / instants - 0.5) * sequence.exposure_s
+    wanted = np.mean(
+        [
+            sharp.mean_image_e(label, number=2, device_time_s=begun_s + by_s).astype(float)
+            for by_s in offsets_s
+        ],
+        axis=0,
+    )
+    at = {"number": 2, "device_time_s": begun_s}
+    middle, blurred = (world(each).mean_image_e(label, **at) for each in ("off", "on"))  # type: ignore[arg-type]
+    left, blurs = (np.abs(each - wanted).max() for each in (blurred, middle))
+    assert left < 0.15 * blurs + 1e-3 * wanted.max()
+
+
+def test_blur_is_called_for_where_an_exposure_is_long_for_what_moves() -> None:
+    scene = passing_bar(2.0)
+    of = world_of(scene, width=163, height=120, readout_s=4e-3)
+
+    short, long = (of.calls(Sequence(exposure_s=each))["blur"] for each in (0.05e-3, 5e-3))
+
+    assert not short.called
+    assert long.called
+    assert (
+        not world_of(find_scene("wall"), width=41, height=30, readout_s=4e-3)
+        .calls(Sequence())["blur"]
+        .called
+    )
 
 
 @pytest.mark.parametrize("place_m", [0.0, 0.004, 0.009, 0.013])
