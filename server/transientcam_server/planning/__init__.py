@@ -14,12 +14,7 @@ from transientcam_server.planning._process.queue import PlanningQueue, Progress,
 from transientcam_server.planning._scene.estimation import ESTIMATORS
 from transientcam_server.planning._scene.scene import Region, SceneStatistics, uniform_scene
 from transientcam_server.planning._search import families
-from transientcam_server.planning._search.families import (
-    SHARE,
-    Goal,
-    flat_from,
-    front,
-    require_plannable,
-)
+from transientcam_server.planning._search.families import SHARE, Goal, require_plannable
+from transientcam_server.planning._search.pareto import flat_from, front
 from transientcam_server.planning._search.plan import Plan
 from transientcam_server.planning._search.search import in_words

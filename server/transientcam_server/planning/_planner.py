@@ -3,6 +3,8 @@
 import io
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -13,13 +15,18 @@ import transientcam_moments as tm
 from transientcam.notebook import palette
 from transientcam_driver import Camera, Capabilities, Sequence, Truth
 from transientcam_server.planning._prediction.prediction import Predictor
-from transientcam_server.planning._prediction.timing import timer_of
+from transientcam_server.planning._prediction.timing import computing_s
 from transientcam_server.planning._process.queue import Progress
 from transientcam_server.planning._scene.look import STEPS, capture_look
 from transientcam_server.planning._scene.scene import SceneStatistics
-from transientcam_server.planning._search.families import Family, Goal, families, require_plannable
+from transientcam_server.planning._search.families import (
+    ComputingTime,
+    Goal,
+    families,
+    require_plannable,
+)
 from transientcam_server.planning._search.plan import Plan, plan
-from transientcam_server.planning._search.search import Choice, ComputingTime, curves
+from transientcam_server.planning._search.search import Choice, curves
 from transientcam_server.planning._search.tradeoff import fronts, lines, tradeoff_document
 from transientcam_server.settings import ReconstructionSettings
 
@@ -106,10 +113,13 @@ class Planner:
 
     def plan(self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None) -> Plan:
         """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
-        progress = progress or Progress()
-        predictor = self._predictor(goal, scene, progress)
-        timed = self._computing_time(goal, progress)
-        return plan(goal, predictor, self._capabilities, timed=timed, progress=progress)
+        progress, predictor, timed = self._prepared(goal, progress)
+        scene, camera = scene.within(goal.region), self._capabilities
+        brighter = scene.brighter(2.0)
+        faster = replace(camera, streaming_readout_s=camera.streaming_readout_s / 2)
+        present = predictor(scene)
+        better = {"readout": (present, faster), "light": (predictor(brighter), camera)}
+        return plan(goal, present, camera, timed=timed, better=better, progress=progress)
 
     def plan_document(
         self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
@@ -137,10 +147,6 @@ class Planner:
         planes.reshape((len(found), -1))[:, every.pixels] = found
         return error_map(*planes)
 
-    def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
-        """Return all that is searched for a goal; see `planning.families`."""
-        return families(goal, self._predictor(goal, scene), self._capabilities)
-
     def tradeoff_document(
         self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
     ) -> dict[str, Any]:
@@ -149,37 +155,30 @@ class Planner:
         ``progress`` shows the same document, without lines, after each point of the front; what it
         raises ends the work.
         """
-        progress = progress or Progress()
-        predictor = self._predictor(goal, scene, progress)
-        scene = predictor.scene
-        found = families(goal, predictor, self._capabilities)
-        candidates = curves(found, goal, predictor, self._computing_time(goal, progress))
+        progress, predicting, timed = self._prepared(goal, progress)
+        predictor, camera = predicting(scene.within(goal.region)), self._capabilities
+        found, scene = families(goal, predictor, camera, timed), predictor.scene
+        candidates = curves(found, goal, predictor, camera, timed)
         choices: list[Choice] = []
         for choices in fronts(candidates, goal.leading, progress.part(0.0, 0.8)):
             progress.show(tradeoff_document(choices, [], scene))
         progress.at(0.8, "lines")
         return tradeoff_document(choices, lines(candidates, choices), scene)
 
-    def _predictor(
-        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
-    ) -> Predictor:
-        seen = scene.within(goal.region)
-        return Predictor(seen, self._sensor, self._settings, go_on=go_on, share=goal.share)
+    def _prepared(
+        self, goal: Goal, progress: Progress | None
+    ) -> tuple[Progress, Callable[[SceneStatistics], Predictor], ComputingTime]:
+        """Return the progress, begun, what predicts for a scene, and what times frames.
 
-    def _computing_time(self, goal: Goal, progress: Progress) -> ComputingTime:
-        """Return what times frames; a budget of computing time needs kernels that are compiled."""
-        timer = timer_of(self._capabilities, self._settings)
-        if goal.computing_share is None:
-            return timer
-
-        def compiled(sequence: Sequence, estimator: str) -> float | None:
-            known_s = timer(sequence, estimator)
-            if known_s is not None:
-                return known_s
-            progress.at(0.0, f"compiling kernels for m = {sequence.harmonics}")
-            return timer.once_compiled(sequence, estimator)
-
-        return compiled
+        A budget of computing time needs kernels that are compiled.
+        """
+        progress = progress or Progress()
+        progress.at(0.0, "sequences for the goal")
+        how: dict[str, Any] = {"sensor": self._sensor, "settings": self._settings}
+        predictor = partial(Predictor, **how, go_on=progress, share=goal.share)
+        compiling = None if goal.computing_share is None else partial(progress.at, 0.0)
+        settings = self._settings.model_dump_json()
+        return progress, predictor, partial(computing_s, self._capabilities, settings, compiling)
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:

@@ -1,6 +1,7 @@
 """A predictor of formulas, and brute force over all that it predicts."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import cast
 
@@ -9,8 +10,15 @@ import numpy as np
 from transientcam_driver import Capabilities, Sequence, SequenceError
 from transientcam_server.planning import Goal, Plan, uniform_scene
 from transientcam_server.planning._prediction.measures import Figure
-from transientcam_server.planning._prediction.prediction import Prediction, Predictor
-from transientcam_server.planning._search.families import EXPOSURES, HARMONICS, TAKES, families
+from transientcam_server.planning._prediction.prediction import Prediction, Predictor, Settings
+from transientcam_server.planning._search.families import (
+    EXPOSURES,
+    HARMONICS,
+    TAKES,
+    Family,
+    Member,
+    families,
+)
 from transientcam_server.planning._search.plan import plan
 
 SPREAD = 1.1
@@ -23,12 +31,7 @@ class ClosedForm:
     def __init__(self, *, far_m: float = 2.0, light: float = 1.0) -> None:
         self.scene = uniform_scene(1e6, [(far_m, 1.0)])
         self.light = light
-
-    def brighter(self, times: float) -> "ClosedForm":
-        return ClosedForm(light=times * self.light)
-
-    def longest_exposure_s(self) -> float:
-        return 0.004 / self.light
+        self.longest_exposure_s = 0.004 / light
 
     def noise_scale(self, sequence: Sequence) -> float:
         return float(np.sqrt(1e-3 / (self.light * sequence.exposure_s * sequence.takes)))
@@ -39,8 +42,19 @@ class ClosedForm:
 
     def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
         m = 1 if estimator == "single-frequency" else sequence.harmonics
-        worse = {"single-frequency": 1.0, "maximum-entropy": 0.6, "likelihood": 0.5}[estimator]
+        worse = {"single-frequency": 1.0, "maximum-entropy": 0.6, "likelihood": 0.5}.get(
+            estimator, 0.7
+        )
         return 0.05 * worse / (m * sequence.base_frequency_hz / 23e6) ** 2
+
+    def bounds(
+        self, estimator: str, sequence: Sequence, settings: Settings, *, biased: bool
+    ) -> tuple[list[float], list[float], float]:
+        pairs = zip(*settings, strict=True)
+        each = [replace(sequence, exposure_s=exposure_s, takes=k) for exposure_s, k in pairs]
+        scales = [self.noise_scale(one) for one in each]
+        noise_m = [self.least_noise_m(estimator, sequence, scale) for scale in scales]
+        return scales, noise_m, self.least_bias_m(estimator, sequence) if biased else 0.0
 
     def quick(self, estimator: str, sequence: Sequence, scale: float) -> tuple[float, float, float]:
         std_m = self.least_noise_m(estimator, sequence, scale)
@@ -68,7 +82,15 @@ class ClosedForm:
 
 
 def planned(goal: Goal, capabilities: Capabilities) -> Plan:
-    return plan(goal, cast(Predictor, ClosedForm()), capabilities, timed=lambda *_: 1e-3)
+    present, brighter = (cast(Predictor, ClosedForm(light=light)) for light in (1.0, 2.0))
+    readout_s = capabilities.streaming_readout_s / 2
+    faster = replace(capabilities, streaming_readout_s=readout_s)
+    better = {"readout": (present, faster), "light": (brighter, capabilities)}
+    return plan(goal, present, capabilities, timed=lambda *_: 1e-3, better=better)
+
+
+def sequence_of(family: Family, member: Member) -> Sequence:
+    return replace(family.first, exposure_s=member.exposure_s, takes=member.takes)
 
 
 @lru_cache(maxsize=1)
@@ -104,6 +126,8 @@ def quickest_s(goal: Goal, predictor: ClosedForm, capabilities: Capabilities) ->
         member.capture_s
         for family in families(goal, like, capabilities)
         for member in family.members
-        if like.predict(family.estimator, family.applied(member).sequence).range_error.with_margin
+        if like.predict(
+            family.estimator, capabilities.apply(sequence_of(family, member)).sequence
+        ).range_error.with_margin
         <= goal.range_error_m
     )

@@ -47,14 +47,21 @@ class ReconstructionTimer:
         self._clock = clock
         self._known: dict[tuple[str, int, int], float] = {}
 
-    def __call__(self, sequence: Sequence, estimator: str) -> float | None:
+    def __call__(
+        self, sequence: Sequence, estimator: str, compiling: Callable[[str], None] | None = None
+    ) -> float | None:
         """Return the time of one frame of a sequence; averaging grows with the number of takes.
 
         None as long as kernels that it needs are not compiled: without them it takes up to fifty
         times as long, which is no figure of the daemon, that compiles them when they are needed.
+        ``compiling`` takes that step, which is then done, once on a machine.
         """
-        if not tm.kernels.settled(self._kernels_of(estimator), sequence.harmonics):
-            return None
+        names = self._kernels_of(estimator)
+        if not tm.kernels.settled(names, sequence.harmonics):
+            if compiling is None:
+                return None
+            compiling(f"compiling kernels for m = {sequence.harmonics}")
+            tm.kernels.compile([sequence.harmonics], ["float32"], names=names)
         once = self._measured(estimator, sequence.harmonics, 1)
         if sequence.takes == 1:
             return once
@@ -63,12 +70,6 @@ class ReconstructionTimer:
         several = self._measured("single-frequency", 1, few)
         averaging = max(0.0, several - self._measured("single-frequency", 1, 1)) / (4 * few)
         return once + averaging * 4 * sequence.harmonics * sequence.takes
-
-    def once_compiled(self, sequence: Sequence, estimator: str) -> float | None:
-        """Compile what it needs first: up to half a minute an order, once on a machine."""
-        names = self._kernels_of(estimator)
-        tm.kernels.compile([sequence.harmonics], ["float32"], names=names)
-        return self(sequence, estimator)
 
     def _kernels_of(self, estimator: str) -> tuple[str, ...]:
         averaging = "neighbours" if self._settings.neighbours == "edge-preserving" else "smooth"
@@ -107,9 +108,18 @@ class ReconstructionTimer:
         return self._clock() - begin_s
 
 
-def timer_of(capabilities: Capabilities, settings: ReconstructionSettings) -> ReconstructionTimer:
-    """Return the timer of this process, which keeps what it has measured."""
-    return _timer_of(capabilities, settings.model_dump_json())
+def computing_s(
+    capabilities: Capabilities,
+    settings: str,
+    compiling: Callable[[str], None] | None,
+    sequence: Sequence,
+    estimator: str,
+) -> float | None:
+    """Return what the timer of this process says, which keeps what it has measured.
+
+    ``settings``: Of the reconstruction, as JSON.
+    """
+    return _timer_of(capabilities, settings)(sequence, estimator, compiling)
 
 
 @lru_cache(maxsize=8)

@@ -43,7 +43,7 @@ class Progress:
         """Report the share of this work that is done, and what is next."""
         whole = self._first + (self._last - self._first) * min(share, 1.0)
         self._now = whole, step
-        self._report(whole, step)
+        self()
 
     def part(self, first: float, last: float, *, show: Show | None = None) -> "Progress":
         """Return the progress of work that is a part of this; ``show`` in the place of its own.

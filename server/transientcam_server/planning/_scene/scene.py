@@ -23,9 +23,6 @@ from transientcam_server.errors import Problem, kinds
 _Array = NDArray[Any]
 STRATUM: Final = 8
 """Pixels of the sample that are of one kind, from the dimmest to the brightest."""
-KINDS_SPREAD: Final = 0.03
-"""Standard deviation of the share of pixels that are predicted to be of another kind than they are:
-as far as predicted and measured shares of outliers are apart (docs/plans.md)."""
 
 
 def typical_pixels(b: _Array, count: int) -> _Array:
@@ -61,21 +58,6 @@ def coherence(b: _Array) -> _Array:
     j = np.arange(1, m + 1)[:, None]
     found: _Array = np.abs((b[1:] * back**j).sum(axis=0)) / (m * size)
     return found
-
-
-def resampled(count: int, samples: int, seed: int) -> _Array:
-    """Return places (samples, count) of other samples of as many pixels.
-
-    Each is of the same kinds, but these are as much more or less frequent as a prediction may be
-    wrong about them: the first ones by a share that has the deviation `KINDS_SPREAD`, at most.
-    """
-    random = np.random.default_rng(seed)
-    place = (np.arange(count) + 0.5) / count
-    tilt = 4 * KINDS_SPREAD * random.normal(size=(samples, 1))
-    tilted = np.clip(place + tilt * place * (1 - place), 0.0, 1.0 - 1e-9)
-    first = (tilted * count).astype(int) // STRATUM * STRATUM
-    width = np.minimum(STRATUM, count - first)
-    return np.asarray(first + random.integers(0, width))
 
 
 def _evenly(order: _Array, parts: int) -> list[_Array]:
@@ -154,8 +136,6 @@ FEW_PIXELS: Final = PIXELS // STRATUM
 """How many of them nearly all is predicted with."""
 MOSTLY_DIM: Final = 0.25
 """Share of dim pixels from which on it matters to the median one."""
-NOTABLE_M: Final = 5e-4
-"""Range that is worth a sentence."""
 AMBIGUOUS_SHARE: Final = 0.02
 """Share of the pixels whose direct return may lie beyond the unambiguous range."""
 LATE_SHARE: Final = 0.05
@@ -273,6 +253,15 @@ class SceneStatistics:
         kept = ("seen", "shape", "drift_m", "lost_share", "of_one_frame")
         return replace(scene, **{name: getattr(self, name) for name in kept})
 
+    def brighter(self, times: float) -> "SceneStatistics":
+        """Return the same scene with so many times the camera's own light."""
+        ambient = float(np.median(self.ambient_dn_per_s))
+        return replace(
+            self,
+            brightness_dn_per_s=times * self.brightness_dn_per_s,
+            brightest_dn_per_s=times * (self.brightest_dn_per_s - ambient) + ambient,
+        )
+
     def to_document(self) -> dict[str, Any]:
         """Return what was seen, as JSON."""
         return {
@@ -301,27 +290,6 @@ class SceneStatistics:
         found = float(np.median(self.uncertainty_m))
         noisier = [float(np.median(each["uncertainty_m"])) for each in self.again] or [found]
         return math.sqrt(max(0.0, 2 * found**2 - float(np.square(noisier).mean())))
-
-    @property
-    def conditions(self) -> str:
-        """Sentences on what of the camera a plan rests on, each after a space; or nothing."""
-        said = ""
-        if not self.calibrated:
-            said = (
-                " No calibration is in use: calibrate first, or ranges are off by more than this "
-                "tells."
-            )
-        elif self.uncalibrated_m > NOTABLE_M:
-            said = (
-                " Calibrate with this sequence: without, ranges are "
-                f"{self.uncalibrated_m * 1e3:.2g} mm off."
-            )
-        if self.drift_m > NOTABLE_M:
-            said += (
-                f" Since the calibration in use ranges may have drifted by {self.drift_m * 1e3:.2g}"
-                " mm."
-            )
-        return said
 
     def contrast_at(self, harmonics: int, base_frequency_hz: float) -> _Array:
         """Return what the device leaves of its modulation (m + 1) at multiples of a frequency."""

@@ -1,19 +1,22 @@
-"""What is searched: goals, families of sequences for them, and what no other point beats."""
+"""What is searched: goals, and families of sequences for them."""
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, TypeVar
+from functools import partial
+from operator import attrgetter
+from typing import Any, Final, NamedTuple
 
-from transientcam_driver import AppliedSequence, Capabilities, Sequence, SequenceError
+from transientcam_driver import Capabilities, Sequence, SequenceError
 from transientcam_moments.comparisons import PLUGINS, technique_of
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import listed
 from transientcam_server.planning._prediction.prediction import OUTVOTED, Predictor
 from transientcam_server.planning._scene.estimation import ESTIMATORS, MOST_HARMONICS, SEARCHED
 from transientcam_server.planning._scene.scene import Region
+from transientcam_server.planning._search.pareto import front
 
 TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
 """Accuracies that a goal may limit; choices are compared by the first by default."""
@@ -68,11 +71,6 @@ class Goal:
             raise Problem(kinds.INVALID_REQUEST, f"estimator must be {limit}.", **told)
 
     @property
-    def empty(self) -> bool:
-        """Whether neither a target nor a budget is given."""
-        return not self.targets and not self.budgets
-
-    @property
     def leading(self) -> str:
         """The target that neighbours are compared by."""
         return next(iter(self.targets), TARGETS[0])
@@ -119,7 +117,7 @@ class Goal:
 
         Raises Problem: ``invalid-request``.
         """
-        if self.empty:
+        if not (*self.targets, *self.budgets):
             raise Problem(
                 kinds.INVALID_REQUEST,
                 "Give a target or a budget.",
@@ -134,52 +132,6 @@ class Goal:
             if value is not None and not 0 < value < most:
                 detail = f"{name} = {value!r} must be {limit}."
                 raise Problem(kinds.INVALID_REQUEST, detail, field=name, value=value, limit=limit)
-
-
-_T = TypeVar("_T")
-LITTLE: Final = 2.0
-"""More time buys little where it leaves more than one over this of the error."""
-
-
-def front(
-    points: Iterable[_T], *, cost: Callable[[_T], float], error: Callable[[_T], float]
-) -> list[_T]:
-    """Return the points on the front, by rising cost and falling error.
-
-    Of points with the same cost and error the first one stays; points of which either is not
-    finite are on no front.
-    """
-    known = [
-        point for point in points if math.isfinite(cost(point)) and math.isfinite(error(point))
-    ]
-    best, chosen = math.inf, []
-    for point in sorted(known, key=lambda point: (cost(point), error(point))):
-        if error(point) < best:
-            best = error(point)
-            chosen.append(point)
-    return chosen
-
-
-def flat_from(errors: list[tuple[float, float, float]]) -> int | None:
-    """Return the first place of a front from which on bias rules and more time buys little.
-
-    Parameters
-    ----------
-    errors
-        Noise, bias, and both together, by rising time.
-
-    Returns
-    -------
-    int or None
-        None where noise rules the last one.
-    """
-    place = None
-    for k in reversed(range(len(errors))):
-        noise, bias, error = errors[k]
-        if bias <= noise or error > LITTLE * errors[-1][2]:
-            break
-        place = k
-    return place
 
 
 FREQUENCY_FACTORS: Final = (1.0, 2.0, 3.0, 0.5)
@@ -203,8 +155,12 @@ class Member:
     """``exposure_s``, ``takes``: in what it differs from the others of its family."""
     capture_s: float
     """Time of one capture."""
+    affordable: bool
+    """Whether it is within the budgets of the goal."""
     scale: float
     """Its noise over that of the predictor's nominal sequence."""
+    least_noise_m: float
+    """Which its noise does not fall below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,13 +170,12 @@ class Family:
     estimator: str
     first: Sequence
     members: tuple[Member, ...]
-    capabilities: Capabilities
+    least_bias_m: float
+    """Which the range error of none hardly falls below; 0 of a goal that does not limit that."""
 
-    def applied(self, member: Member) -> AppliedSequence:
-        """Return a member as the camera would set it."""
-        return self.capabilities.apply(
-            replace(self.first, exposure_s=member.exposure_s, takes=member.takes)
-        )
+
+ComputingTime = Callable[[Sequence, str], float | None]
+"""Computing time in s of a frame of a sequence with an estimator, if it is known."""
 
 
 def require_plannable(capabilities: Capabilities) -> None:
@@ -244,42 +199,53 @@ def require_plannable(capabilities: Capabilities) -> None:
     )
 
 
-def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> list[Family]:
+def families(
+    goal: Goal,
+    predictor: Predictor,
+    capabilities: Capabilities,
+    computing_s: ComputingTime = lambda *_: None,
+) -> list[Family]:
     """Return what the camera can run that saturates nothing and is not ambiguous.
 
+    It is plain data, with all that is known of it without a draw. ``computing_s`` is asked where
+    the goal limits it.
     Raises Problem ``target-unreachable`` where there is nothing, with the reason.
     """
     require_plannable(capabilities)
-    longest_s = min(predictor.longest_exposure_s() * FILLED, capabilities.max_exposure_s)
+    scene = predictor.scene
+    longest_s = min(predictor.longest_exposure_s * FILLED, capabilities.max_exposure_s)
     exposures_s = _exposures(goal, capabilities, longest_s)
     if not exposures_s:
         raise _nothing(
             goal, f"it saturates at more than {longest_s:.3g} s of exposure", "exposure_s"
         )
-    unambiguous_m = _unambiguous_m(goal, capabilities, exposures_s[0])
-    if not unambiguous_m:
+    steady = _steady_takes(goal, scene.lost_share)
+    least_takes = goal.base.takes if "takes" in goal.fixed else 1
+    grids = []
+    for sequence, estimator in _frequencies(goal):
+        with suppress(SequenceError):
+            tried = replace(sequence, exposure_s=exposures_s[0], takes=least_takes)
+            range_m = capabilities.apply(tried).unambiguous_range_m
+            how = estimator, exposures_s, capabilities, steady, computing_s
+            grids.append((sequence, estimator, range_m, _grid(goal, sequence, *how)))
+    if not grids:
         raise _nothing(goal, "the fixed fields exclude all", "fixed")
-    scene = predictor.scene
-    clear = [each for each, range_m in unambiguous_m.items() if not scene.ambiguous(range_m)]
+    # short captures first: what they reach rules out most of the longer ones
+    grids.sort(key=lambda each: min(setting.capture_s for setting in each[-1]))
+    clear = [each for each in grids if not scene.ambiguous(each[2])]
     if not clear:
-        far_m, most_m = float(scene.direct_m.max()), max(unambiguous_m.values())
+        far_m, most_m = float(scene.direct_m.max()), max(each[2] for each in grids)
         reason = f"it is up to {far_m:.1f} m away, and ranges are unambiguous to {most_m:.1f} m"
         raise _nothing(goal, reason, "base_frequency_hz")
-    scales = {
-        (each_s, zeroth): predictor.noise_scale(
-            replace(goal.base, exposure_s=each_s, zeroth=zeroth, takes=1)
-        )
-        for each_s in exposures_s
-        for zeroth in _zeroths(goal)
-    }
-    steady = _steady_takes(goal, scene.lost_share)
-    found = [
-        Family(estimator, sequence, members, capabilities)
-        for sequence, estimator in clear
-        if (members := _members(goal, sequence, scales, capabilities, steady))
-    ]
-    # short captures first: what they reach rules out most of the longer ones
-    return sorted(found, key=lambda family: family.members[0].capture_s)
+    found, biased = [], goal.leading == "range_error_m"
+    for sequence, estimator, _, grid in clear:
+        columns = tuple(zip(*grid, strict=True))
+        of = estimator, sequence, (columns[0], columns[1])
+        scales, noise_m, bias_m = predictor.bounds(*of, biased=biased)
+        members = map(Member, *columns, scales, noise_m)
+        best = front(members, cost=attrgetter("capture_s"), error=attrgetter("scale"))
+        found.append(Family(estimator, sequence, tuple(best), bias_m))
+    return found
 
 
 def _exposures(goal: Goal, capabilities: Capabilities, longest_s: float) -> list[float]:
@@ -301,19 +267,6 @@ def _zeroths(goal: Goal) -> tuple[Any, ...]:
     if goal.bound_width is None:
         return ("estimated",)
     return ("estimated", "on-off", "low-frequency")
-
-
-def _unambiguous_m(
-    goal: Goal, capabilities: Capabilities, exposure_s: float
-) -> dict[tuple[Sequence, str], float]:
-    """Return the unambiguous range of all frequencies and estimators that the camera can run."""
-    takes = goal.base.takes if "takes" in goal.fixed else 1
-    ranges_m = {}
-    for sequence, estimator in _frequencies(goal):
-        with suppress(SequenceError):
-            applied = capabilities.apply(replace(sequence, exposure_s=exposure_s, takes=takes))
-            ranges_m[sequence, estimator] = applied.unambiguous_range_m
-    return ranges_m
 
 
 def _frequencies(goal: Goal) -> Iterator[tuple[Sequence, str]]:
@@ -348,32 +301,36 @@ def _steady_takes(goal: Goal, lost_share: float) -> tuple[int, ...]:
     )
 
 
-def _members(
+class _Setting(NamedTuple):
+    exposure_s: float
+    takes: int
+    capture_s: float
+    affordable: bool
+
+
+def _grid(
     goal: Goal,
     sequence: Sequence,
-    scales: dict[tuple[float, str], float],
+    estimator: str,
+    exposures_s: list[float],
     capabilities: Capabilities,
     steady: tuple[int, ...],
-) -> tuple[Member, ...]:
+    computing_s: ComputingTime,
+) -> list[_Setting]:
     images = sequence.images_per_take
     most_takes = min(capabilities.max_takes, capabilities.max_images // images)
     takes = steady if sequence.harmonics == 1 and steady[0] <= most_takes else TAKES
     takes = (goal.base.takes,) if "takes" in goal.fixed else takes
-    settling_s = {
-        each: capabilities.settle_s * replace(sequence, takes=each).frequency_changes
-        for each in takes
-    }
-    members = []
-    for (exposure_s, zeroth), scale in scales.items():
-        if zeroth != sequence.zeroth:
-            continue
+    several = [replace(sequence, takes=each) for each in takes if each <= most_takes]
+    settling_s = [capabilities.settle_s * each.frequency_changes for each in several]
+    found = []
+    for exposure_s in exposures_s:
         image_s = exposure_s + capabilities.streaming_readout_s
-        members += [
-            Member(exposure_s, each, each * images * image_s + settling_s[each], scale / each**0.5)
-            for each in takes
-            if each <= most_takes
-        ]
-    return tuple(front(members, cost=lambda each: each.capture_s, error=lambda each: each.scale))
+        for each, settle_s in zip(several, settling_s, strict=True):
+            capture_s = each.takes * images * image_s + settle_s
+            affordable = goal.affords(capture_s, partial(computing_s, each, estimator))
+            found.append(_Setting(exposure_s, each.takes, capture_s, affordable))
+    return found
 
 
 def _nothing(goal: Goal, reason: str, field: str) -> Problem:

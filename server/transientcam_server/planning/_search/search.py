@@ -11,13 +11,14 @@ one, and may rise again.
 import bisect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Final, NamedTuple
 
-from transientcam_driver import AppliedSequence, Sequence
+from transientcam_driver import AppliedSequence, Capabilities, Sequence
 from transientcam_server.planning._prediction.measures import TOLERANCES_M, Figure
 from transientcam_server.planning._prediction.prediction import Prediction, Predictor
-from transientcam_server.planning._search.families import Family, Goal, Member
+from transientcam_server.planning._search.families import ComputingTime, Family, Goal, Member
 
 
 def in_words(sequence: Sequence, estimator: str) -> str:
@@ -158,8 +159,6 @@ class Choice:
 
 Targets = Mapping[str, float]
 """The largest error that each target allows."""
-ComputingTime = Callable[[Sequence, str], float | None]
-"""Computing time in s of a frame of a sequence with an estimator, if it is known."""
 
 
 @dataclass(slots=True, eq=False)
@@ -170,13 +169,14 @@ class Candidate:
     member: Member
     """``family``, ``member``: frequencies and estimator; exposure and takes."""
     affordable: bool
-    """Whether it is within the budgets of the goal."""
+    """Whether it is within the budgets of the search."""
     goal: Goal
     """Whose targets are predicted."""
     predictor: Predictor
     """Of the scene."""
-    reconstruct_s: Callable[[], float | None]
-    """Returns the computing time of a frame in s, if it is known."""
+    capabilities: Capabilities
+    """Of the camera."""
+    computing_s: ComputingTime
     _choice: Choice | None = None
 
     @property
@@ -185,20 +185,16 @@ class Candidate:
         return self.member.capture_s
 
     @property
-    def sequence(self) -> Sequence:
+    def applied(self) -> AppliedSequence:
         """As the camera would set it."""
-        return self.family.applied(self.member).sequence
-
-    def least_bias_m(self) -> float:
-        """Return what the bias of its family hardly falls below."""
-        return self.predictor.least_bias_m(self.family.estimator, self.family.first)
+        exposure_s, takes = self.member.exposure_s, self.member.takes
+        return self.capabilities.apply(
+            replace(self.family.first, exposure_s=exposure_s, takes=takes)
+        )
 
     def least_error(self, target: str) -> float:
         """Return a lower bound of the error that a target limits; 0 where none is known."""
-        if not target.startswith("range"):
-            return 0.0
-        family = self.family
-        return self.predictor.least_noise_m(family.estimator, family.first, self.member.scale)
+        return self.member.least_noise_m if target.startswith("range") else 0.0
 
     def range_errors_m(self) -> tuple[float, float, float]:
         """Return deviation, bias and error of the range, by few draws."""
@@ -208,37 +204,38 @@ class Candidate:
     def error(self, target: str) -> float:
         """Return the error that a target limits, by few draws."""
         if target == "bound_width":
-            return self.predictor.bound_width(self.sequence)
+            return self.predictor.bound_width(self.applied.sequence)
         if target == "separation_m":
             assert self.goal.separation_m is not None  # noqa: S101 - it is a target
-            return 1.0 - self.predictor.separation(self.sequence, self.goal.separation_m)
+            distance_m = self.goal.separation_m
+            return 1.0 - self.predictor.separation(self.applied.sequence, distance_m)
         std_m, _, error_m = self.range_errors_m()
         return std_m if target == "range_std_m" else error_m
 
     def choice(self, *, closely: bool = False) -> Choice:
         """Predict it by many draws, and ``closely`` for many pixels, too."""
-        if closely or self._choice is None:
-            self._choice = self._predicted(closely=closely)
+        if self._choice is None or closely:
+            applied, estimator, predictor = self.applied, self.family.estimator, self.predictor
+            sequence, goal, width, share = applied.sequence, self.goal, None, None
+            if goal.bound_width is not None:
+                width = predictor.bound_width(sequence)
+            if goal.separation_m is not None:
+                share = predictor.separation(sequence, goal.separation_m)
+            self._choice = Choice(
+                applied,
+                estimator,
+                beyond_scene=predictor.beyond_scene(sequence),
+                predicted=predictor.predict(
+                    estimator, sequence, closely=closely, capture_s=applied.capture_s
+                ),
+                timed=partial(self.computing_s, sequence, estimator),
+                bound_width=width,
+                separation_share=share,
+                settling_s=self.capabilities.settle_s * sequence.frequency_changes,
+                share=goal.share,
+                target_m=goal.range_error_m,
+            )
         return self._choice
-
-    def _predicted(self, *, closely: bool) -> Choice:
-        applied = self.family.applied(self.member)
-        sequence, estimator = applied.sequence, self.family.estimator
-        bounded, distance_m = self.goal.bound_width is not None, self.goal.separation_m
-        return Choice(
-            applied,
-            estimator,
-            self.predictor.predict(
-                estimator, sequence, closely=closely, capture_s=applied.capture_s
-            ),
-            self.predictor.beyond_scene(sequence),
-            self.reconstruct_s,
-            self.predictor.bound_width(sequence) if bounded else None,
-            None if distance_m is None else self.predictor.separation(sequence, distance_m),
-            self.family.capabilities.settle_s * sequence.frequency_changes,
-            self.goal.share,
-            self.goal.range_error_m,
-        )
 
 
 Curve = tuple[Candidate, ...]
@@ -246,18 +243,22 @@ Curve = tuple[Candidate, ...]
 
 
 def curves(
-    families: list[Family], goal: Goal, predictor: Predictor, computing_s: ComputingTime
+    families: list[Family],
+    goal: Goal,
+    predictor: Predictor,
+    capabilities: Capabilities,
+    computing_s: ComputingTime,
 ) -> list[Curve]:
-    """Return the candidates of each family; nothing is predicted yet."""
+    """Return the candidates of each family; nothing is drawn yet.
 
-    def candidate(family: Family, member: Member) -> Candidate:
-        def reconstruct_s() -> float | None:
-            return computing_s(family.applied(member).sequence, family.estimator)
-
-        affordable = goal.affords(member.capture_s, reconstruct_s)
-        return Candidate(family, member, affordable, goal, predictor, reconstruct_s)
-
-    return [tuple(candidate(family, each) for each in family.members) for family in families]
+    ``goal``: That of the families, or the one without its budgets.
+    ``computing_s``: Returns the computing time of a frame in s, if it is known.
+    """
+    anyhow, of = not goal.budgets, (goal, predictor, capabilities, computing_s)
+    return [
+        tuple(Candidate(each, one, one.affordable or anyhow, *of) for one in each.members)
+        for each in families
+    ]
 
 
 def longest(curve: Curve, within_s: float = math.inf) -> int | None:
@@ -291,7 +292,7 @@ def finest(
     for least, candidate in sorted(bounded, key=lambda each: each[0]):
         if least > worst:
             break
-        if target == "range_error_m" and candidate.least_bias_m() > worst:
+        if target == "range_error_m" and candidate.family.least_bias_m > worst:
             continue
         error = candidate.error(target)
         drawn.append((error, candidate))
@@ -402,7 +403,7 @@ def _expected(possible: list[_Place], targets: Targets, within_s: float) -> list
         last = longest(curve, near_s)
         if last is None or first > last:
             continue
-        if "range_error_m" in targets and curve[first].least_bias_m() > targets["range_error_m"]:
+        if curve[first].family.least_bias_m > targets.get("range_error_m", math.inf):
             continue
         place = _first_affordable(curve, tolerated, first, last)
         if place is not None and curve[place].capture_s < within_s:

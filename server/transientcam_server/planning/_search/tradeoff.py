@@ -7,9 +7,9 @@ from typing import Any, Final
 from transientcam_driver import Sequence
 from transientcam_server.planning._process.queue import Progress
 from transientcam_server.planning._scene.scene import SceneStatistics
-from transientcam_server.planning._search.families import front
-from transientcam_server.planning._search.plan import summary_of_front
+from transientcam_server.planning._search.pareto import front
 from transientcam_server.planning._search.search import Choice, Curve, finest
+from transientcam_server.planning._search.words import summary_of_front
 
 ON_FRONT: Final = 12
 """Times that the front is made of."""
@@ -48,7 +48,7 @@ def lines(curves: list[Curve], choices: list[Choice]) -> list[dict[str, Any]]:
     return [
         _line(curve)
         for curve in curves
-        if _frequencies(curve[0].family.estimator, curve[0].sequence) in chosen
+        if _frequencies(curve[0].family.estimator, curve[0].applied.sequence) in chosen
     ]
 
 
@@ -67,7 +67,7 @@ def _line(curve: Curve) -> dict[str, Any]:
     """Return the predicted errors in m of the median pixel by the length of captures."""
     names = "capture_s", "range_std_m", "range_bias_m", "range_error_m"
     shown = [each for each in curve if each.capture_s <= LONGEST_S]
-    shortest = curve[0].sequence
+    shortest = curve[0].applied.sequence
     return {
         "estimator": curve[0].family.estimator,
         "harmonics": shortest.harmonics,

@@ -12,6 +12,7 @@ from transientcam_server.planning._prediction.measures import (
     _widened,
     between,
     figure,
+    resampled,
 )
 
 ERROR = Figure(median=5e-3, low=4e-3, high=6e-3, p90=9e-3, with_margin=5.3e-3)
@@ -98,3 +99,13 @@ def test_an_end_without_a_logarithm_stays_as_it_is(value: float, sampled: float)
 
 def test_a_figure_is_stated_without_its_margin() -> None:
     assert ERROR.to_document() == {"median": 5e-3, "low": 4e-3, "high": 6e-3, "p90": 9e-3}
+
+
+def test_other_samples_differ_in_how_frequent_kinds_are_by_a_few_percent() -> None:
+    count = 128
+    picks = resampled(count, 4000, seed=3)
+    assert picks.min() >= 0
+    assert picks.max() < count
+    first = (picks < count // 2).mean(axis=1)
+    assert first.mean() == pytest.approx(0.5, abs=0.01)
+    assert first.std() == pytest.approx(0.03, rel=0.2)

@@ -25,6 +25,13 @@ def wall() -> tuple[Planner, SceneStatistics]:
     return looked("sim:wall?seed=7")
 
 
+def least_noise_m(predictor: Predictor, sequence: Sequence) -> float:
+    setting = (sequence.exposure_s,), (sequence.takes,)
+    (scale,), (least_m,), _ = predictor.bounds("single-frequency", sequence, setting)
+    assert scale == pytest.approx(predictor.noise_scale(sequence))
+    return least_m
+
+
 @pytest.mark.parametrize(
     ("neighbours", "left"),
     [("edge-preserving", LEAST_SHARE), ("gaussian", tm.noise.smoothing_factor(0.6)), ("none", 1)],
@@ -49,9 +56,7 @@ def test_deviation_of_one_return_at_one_frequency_is_the_closed_form(
     assert predicted.range_std.median == pytest.approx(expected_m, rel=0.05)
     # the median over 30 draws is itself that noisy
     assert predicted.range_bias_m < 0.25 * expected_m
-    assert predictor.least_noise_m(
-        "single-frequency", sequence, predictor.noise_scale(sequence)
-    ) == pytest.approx(expected_m, rel=1e-3)
+    assert least_noise_m(predictor, sequence) == pytest.approx(expected_m, rel=1e-3)
 
 
 def test_what_the_camera_does_is_part_of_the_error() -> None:
@@ -174,7 +179,7 @@ def test_a_share_of_the_pixels_of_a_wall_is_within_what_its_noise_gives() -> Non
     scene = uniform_scene(4e5, [(2.0, 1.0)])
     sequence = Sequence(harmonics=1, exposure_s=0.001, takes=2, zeroth="estimated")
     of_median = Predictor(scene, tm.noise.Sensor(), SETTINGS)
-    std_m = of_median.least_noise_m("single-frequency", sequence, of_median.noise_scale(sequence))
+    std_m = least_noise_m(of_median, sequence)
 
     for share, deviations in ((0.6827, 1.0), (0.9, 1.6449), (0.9545, 2.0)):
         predictor = Predictor(scene, tm.noise.Sensor(), SETTINGS, share=share)
@@ -184,8 +189,8 @@ def test_a_share_of_the_pixels_of_a_wall_is_within_what_its_noise_gives() -> Non
         assert predicted.within.median == pytest.approx(deviations * std_m, rel=0.04)
         assert predicted.within.low < predicted.within.median < predicted.within.with_margin
         assert predicted.share_within(deviations * std_m) == pytest.approx(share, abs=0.02)
+        assert least_noise_m(predictor, sequence) < deviations * std_m
         scale = predictor.noise_scale(sequence)
-        assert predictor.least_noise_m("single-frequency", sequence, scale) < deviations * std_m
         few_m = predictor.quick("single-frequency", sequence, scale)[2]
         assert 1 < few_m / (deviations * std_m) < TOLERANCE  # else a search overlooks it
     assert of_median.predict("single-frequency", sequence).within is None

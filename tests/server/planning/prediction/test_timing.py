@@ -107,7 +107,9 @@ def test_no_computing_time_is_stated_before_the_kernels_of_a_frame_are_there(
     sequence = Sequence(harmonics=3)
 
     assert seconds(sequence, "maximum-entropy") is None
-    assert seconds.once_compiled(sequence, "maximum-entropy") is not None
+    steps: list[str] = []
+    assert seconds(sequence, "maximum-entropy", steps.append) is not None
+    assert steps == ["compiling kernels for m = 3"]
     assert ("peaks", 3) in compiled
     assert seconds(sequence, "maximum-entropy") is not None
     assert seconds(sequence, "likelihood") is None

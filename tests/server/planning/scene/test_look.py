@@ -13,6 +13,7 @@ from transientcam_server.camera import sensor_of
 from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal, Planner, Progress
 from transientcam_server.planning._scene.look import FRAMES, STILL_FRAMES, STILL_SHARE
+from transientcam_server.planning._search.words import conditions
 from transientcam_server.settings import SensorSettings
 
 
@@ -148,8 +149,8 @@ def test_what_a_device_does_is_not_taken_for_the_scene() -> None:
     assert np.median(scene.direct_m) == pytest.approx(np.median(true_m), abs=0.01)
     # 25 degrees Celsius when it is switched on, and 1.5 mm for each degree at most
     assert scene.drift_m == pytest.approx(0.015, abs=0.002)
-    assert "Calibrate with this sequence" in scene.conditions
-    assert "drifted" in scene.conditions
+    assert "Calibrate with this sequence" in conditions(scene)
+    assert "drifted" in conditions(scene)
 
 
 def test_nominal_gains_of_a_real_camera_are_no_calibration() -> None:
@@ -161,7 +162,7 @@ def test_nominal_gains_of_a_real_camera_are_no_calibration() -> None:
     assert not scene.calibrated
     assert np.array(scene.contrast)[[1, 4, 8]] == pytest.approx([1.0, 0.951, 0.553], abs=0.06)
     assert scene.disagreement_m < 1e-3
-    assert "calibrate first" in scene.conditions
+    assert "calibrate first" in conditions(scene)
     goal = Goal(range_error_m=1e-5, estimator="single-frequency")
     with pytest.raises(Problem, match="a look without a calibration does not tell") as refused:
         planner.plan(goal, scene)

@@ -10,7 +10,6 @@ from transientcam_server.planning._scene.scene import (
     STRATUM,
     coherence,
     one_of_each,
-    resampled,
     typical_pixels,
 )
 
@@ -68,12 +67,3 @@ def test_moments_of_one_return_are_coherent_and_of_two_less() -> None:
     found = coherence(b)
     assert found[~two] == pytest.approx(1.0)
     assert found[two].max() < 0.9
-
-
-def test_other_samples_differ_in_how_frequent_kinds_are_by_a_few_percent() -> None:
-    picks = resampled(COUNT, 4000, seed=3)
-    assert picks.min() >= 0
-    assert picks.max() < COUNT
-    first = (picks < COUNT // 2).mean(axis=1)
-    assert first.mean() == pytest.approx(0.5, abs=0.01)
-    assert first.std() == pytest.approx(0.03, rel=0.2)

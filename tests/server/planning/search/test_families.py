@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import pytest
 
-from tests.server.planning.closed_form import ClosedForm
+from tests.server.planning.closed_form import ClosedForm, sequence_of
 from transientcam_driver import Capabilities, Sequence
 from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal
@@ -21,10 +21,7 @@ class Light(ClosedForm):
 
     def __init__(self, saturating_s: float) -> None:
         super().__init__()
-        self._saturating_s = saturating_s
-
-    def longest_exposure_s(self) -> float:
-        return self._saturating_s
+        self.longest_exposure_s = saturating_s
 
 
 def found(goal: Goal, capabilities: Capabilities, *, saturating_s: float = 0.004) -> list[Family]:
@@ -74,7 +71,7 @@ def test_a_field_that_is_fixed_stays(
     goal = Goal(base=BASE, capture_s=1.0, fixed=frozenset({fixed}))
 
     seen = {
-        getattr(each.applied(member).sequence, fixed)
+        getattr(capabilities.apply(sequence_of(each, member)).sequence, fixed)
         for each in found(goal, capabilities)
         for member in each.members
     }
@@ -177,7 +174,7 @@ def test_members_take_the_time_that_the_camera_states_and_noise_falls_along_them
         assert times_s == sorted(times_s)
         assert scales == sorted(scales, reverse=True)
         for member in family.members:
-            applied = family.applied(member)
+            applied = settling.apply(sequence_of(family, member))
             assert member.capture_s == pytest.approx(applied.capture_s, rel=1e-6)
             # in units of a capture of 1 ms and one take
             exposure_ms = applied.sequence.exposure_s * 1e3
@@ -211,7 +208,8 @@ def curve(capabilities: Capabilities) -> tuple[Candidate, ...]:
     """Candidates of which the budgets allow the second to the fourth."""
     goal = Goal(base=BASE, capture_s=1.0)
     predictor = cast(Predictor, Light(0.004))
-    whole = curves(families(goal, predictor, capabilities), goal, predictor, lambda *_: 1e-3)[0]
+    found = families(goal, predictor, capabilities)
+    whole = curves(found, goal, predictor, capabilities, lambda *_: 1e-3)[0]
     assert len(whole) > 5
     return tuple(
         dataclasses.replace(each, affordable=place in (1, 2, 3)) for place, each in enumerate(whole)

@@ -34,9 +34,8 @@ def test_a_separation_allows_as_many_misses_as_its_share_leaves() -> None:
 
 
 @pytest.mark.parametrize("given", [{"range_std_m": 1.0}, {"capture_s": 1.0}])
-def test_a_goal_of_anything_is_not_empty(given: dict[str, Any]) -> None:
-    assert not Goal(**given).empty
-    assert Goal().empty
+def test_a_goal_of_anything_makes_sense(given: dict[str, Any]) -> None:
+    Goal(**given).require_sensible()
 
 
 def test_without_budgets_the_targets_stay() -> None:

@@ -8,8 +8,8 @@ from tests.server.planning.search.choices import choice
 from transientcam_driver import Capabilities
 from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal
-from transientcam_server.planning._search.plan import Shortfall, refusal
 from transientcam_server.planning._search.search import Choice
+from transientcam_server.planning._search.words import Shortfall, refusal
 
 
 def refused(

@@ -8,7 +8,7 @@ import pytest
 from tests.server.planning.search.choices import choice
 from transientcam_driver import Capabilities
 from transientcam_server.planning import SceneStatistics, uniform_scene
-from transientcam_server.planning._search.plan import summary, summary_of_front
+from transientcam_server.planning._search.words import summary, summary_of_front
 
 SCENE = uniform_scene(1e6, [(2.0, 1.0)])
 

@@ -20,7 +20,7 @@ def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
     predictor = cast(Predictor, ClosedForm())
     goal = Goal()
     found = families(goal, predictor, capabilities)
-    candidates = curves(found, goal, predictor, lambda *_: 1e-3)
+    candidates = curves(found, goal, predictor, capabilities, lambda *_: 1e-3)
 
     shares: list[float] = []
     progress = Progress(lambda share, step: shares.append(share))
@@ -100,7 +100,8 @@ def test_lines_are_of_at_most_sixteen_points_within_five_seconds(
     capabilities: Capabilities,
 ) -> None:
     predictor = cast(Predictor, ClosedForm())
-    candidates = curves(families(Goal(), predictor, capabilities), Goal(), predictor, lambda *_: 0)
+    found = families(Goal(), predictor, capabilities)
+    candidates = curves(found, Goal(), predictor, capabilities, lambda *_: 0)
     *_, front = fronts(candidates, "range_error_m")
 
     drawn = lines(candidates, front)
@@ -117,8 +118,8 @@ def test_lines_are_of_at_most_sixteen_points_within_five_seconds(
             curve
             for curve in candidates
             if curve[0].family.estimator == each["estimator"]
-            and curve[0].sequence.harmonics == each["harmonics"]
-            and curve[0].sequence.base_frequency_hz == each["base_frequency_hz"]
+            and curve[0].applied.sequence.harmonics == each["harmonics"]
+            and curve[0].applied.sequence.base_frequency_hz == each["base_frequency_hz"]
         )
         shown_s = [one.capture_s for one in curve if one.capture_s <= 5.0]
         times_s = [point["capture_s"] for point in each["points"]]
