@@ -129,7 +129,7 @@ def run(
     wanted = inspect.signature(function).parameters
     with tempfile.TemporaryDirectory() as folder:
         own = {"write": write, "figures": docs / "figures" if write else Path(folder)}
-        given = {**measurement.given, **asked, **{n: own[n] for n in _OWN if n in wanted}}
+        given = {**asked, **{n: own[n] for n in _OWN if n in wanted}}
         tables = []
         for table in function(**given) or ():
             show(table, console)

@@ -17,10 +17,8 @@ import trustme
 
 from benchmarks.abuse.attacks import SOURCE
 from benchmarks.common.daemon import VIDEO, Process
-from benchmarks.service.viewers import Viewer, cut, watch
-from transientcam import wire
+from benchmarks.service.viewers import RANGE, Viewer, cut, watch
 
-RANGE = wire.Subscribe((wire.Subscription("range"),)).to_document()
 GIVE_UP_S: Final = 30.0
 """What was not done by then is taken for never."""
 LEASE_S: Final = 2.0

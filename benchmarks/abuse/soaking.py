@@ -8,10 +8,10 @@ from typing import Final
 
 import httpx
 
-from benchmarks.abuse.measuring import GIVE_UP_S, HISTORY_S, RANGE, attacked, prepare, served
+from benchmarks.abuse.measuring import GIVE_UP_S, HISTORY_S, attacked, prepare, served
 from benchmarks.common.tables import Table, heads
 from benchmarks.service.soak import HELD, UNITS, Sample
-from benchmarks.service.viewers import Viewer, cut, watch
+from benchmarks.service.viewers import RANGE, Viewer, cut, watch
 
 CONNECTIONS: Final = 8
 SAMPLE_S: Final = 2.0

@@ -7,7 +7,7 @@ from transientcam_driver import Camera, Sequence
 from transientcam_experiments.tradeoff import camera_before
 from transientcam_experiments.tradeoff.capture import capture
 from transientcam_server.camera import sensor_of
-from transientcam_server.imaging import Recipe, ranges_m
+from transientcam_server.imaging import Gains, Recipe, ranges_m
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.planning import Planner, SceneStatistics
 from transientcam_server.planning._prediction.measures import pixel_errors
@@ -22,13 +22,20 @@ _NO_LIGHT = 1e-12
 SETTINGS = ReconstructionSettings()
 
 
+def recipe_of(
+    camera: Camera, gains: Gains | None = None, settings: ReconstructionSettings = SETTINGS
+) -> Recipe:
+    """Return how frames of the present sequence are reconstructed."""
+    sensor = sensor_of(camera, SensorSettings())
+    return Recipe(camera.applied, settings, float(sensor.highest_dn), gains, sensor=sensor)
+
+
 def captured(
     camera: Camera, sequence: Sequence, frames: int, settings: ReconstructionSettings = SETTINGS
 ) -> tuple[Recipe, list[tm.Reconstruction]]:
     """Capture and reconstruct frames with a sequence."""
-    applied = camera.configure(sequence)
-    sensor = sensor_of(camera, SensorSettings())
-    recipe = Recipe(applied, settings, float(sensor.highest_dn), sensor=sensor)
+    camera.configure(sequence)
+    recipe = recipe_of(camera, settings=settings)
     return recipe, [recipe.reconstruct(each.raw) for each in capture(camera, frames)]
 
 
@@ -67,8 +74,7 @@ def measured(
     pixels, errors_m, device_s, full = None, [], 0.0, 0.0
     with camera_before(scene, seed=CAPTURE_SEED) as camera:
         applied = camera.configure(sequence)
-        sensor = sensor_of(camera, SensorSettings())
-        recipe = Recipe(applied, SETTINGS, float(sensor.highest_dn), sensor=sensor)
+        recipe = recipe_of(camera)
         for each in capture(camera, captures, middle=True):
             truth, device_s = each.truth, each.raw.capture_s
             if pixels is None:
@@ -77,7 +83,7 @@ def measured(
                 random = np.random.default_rng(1)
                 pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
                 brightest = each.raw.images.max(axis=0).ravel()[lit]
-                full = float((brightest >= sensor.highest_dn).mean())
+                full = float((brightest >= recipe.full_scale).mean())
             found = recipe.reconstruct(each.raw)
             b = np.asarray(found.smoothed)
             variance = np.asarray(moment_noise(recipe, found).variance)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.accuracy import worlds
-from benchmarks.accuracy.capturing import CAPTURE_SEED, LOOK_SEED, PIXELS, SETTINGS
+from benchmarks.accuracy.capturing import CAPTURE_SEED, LOOK_SEED, PIXELS, SETTINGS, recipe_of
 from benchmarks.accuracy.held import SHARE, Outcome, tables_of
 from benchmarks.common.tables import Table, heads
 from transientcam_driver import Camera, Sequence, capture_calibration, open_camera
@@ -32,14 +32,7 @@ from transientcam_driver.clock import Clock, RealClock, VirtualClock
 from transientcam_experiments.tradeoff.capture import capture
 from transientcam_server.camera import sensor_of, start_with
 from transientcam_server.errors import Problem
-from transientcam_server.imaging import (
-    Gains,
-    Recipe,
-    evaluate,
-    factory_gains,
-    ranges_m,
-    typical_deviation,
-)
+from transientcam_server.imaging import Gains, evaluate, factory_gains, ranges_m, typical_deviation
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.planning import ESTIMATORS, Goal, Planner, SceneStatistics, takes_of
 from transientcam_server.planning._scene.look import look_of_frame
@@ -191,7 +184,7 @@ def held_takes(scene: str) -> list[tuple[Any, ...]]:
     rows = []
     with opened(KINECT, scene, CAPTURE_SEED) as (camera, _):
         camera.configure(replace(camera.applied.sequence, takes=1))
-        recipe = _recipe(camera, factory_gains(camera.factory))
+        recipe = recipe_of(camera, factory_gains(camera.factory))
         (frame,) = capture(camera, 1)
         for each in takes_of(frame.raw, recipe, camera.capabilities, takes=(1, 4, 16)):
             camera.configure(replace(camera.applied.sequence, takes=each.takes))
@@ -208,17 +201,12 @@ def _sensor(camera: Camera) -> tm.noise.Sensor:
     return sensor_of(camera, SensorSettings())
 
 
-def _recipe(camera: Camera, gains: Gains | None) -> Recipe:
-    sensor = _sensor(camera)
-    return Recipe(camera.applied, SETTINGS, float(sensor.highest_dn), gains, sensor=sensor)
-
-
 def _seen(device: Device, planner: Planner, camera: Camera, clock: Clock) -> SceneStatistics:
     if not device.one_frame:
         calibrated_c = _temperature_c(camera)
         _warm(device, camera, clock)
         return planner.look(camera, Sequence(), calibrated_c=calibrated_c)
-    recipe = _recipe(camera, None if device.ideal else _calibrated(camera))
+    recipe = recipe_of(camera, None if device.ideal else _calibrated(camera))
     (frame,) = capture(camera, 1)
     return look_of_frame(recipe, recipe.reconstruct(frame.raw), frame.raw, None)
 
@@ -345,7 +333,7 @@ def _captured(
         _warm(device, camera, clock)
         for sequence in sequences:
             applied = camera.configure(sequence)
-            recipe = _recipe(camera, gains[sequence.base_frequency_hz, sequence.harmonics])
+            recipe = recipe_of(camera, gains[sequence.base_frequency_hz, sequence.harmonics])
             parts = []
             for frame in capture(camera, captures, middle=True):
                 truth = frame.truth

@@ -7,30 +7,6 @@ from typing import Final
 from benchmarks.common.records import ROOT
 
 _DEFAULT: Final = ROOT.parent / "shared" / "data"
-COMPOSITE: Final = """
-name = "composite"
-description = "One photon-counting measurement and two through foam, one after the other"
-[light]
-electrons_per_s = 1.0e7
-[[response]]
-file = "{data}/measured/capture_direct.npz"
-background = "median"
-time_zero_file = "{data}/measured/capture_direct.npz"
-weight = 0.55
-delay_s = 3e-9
-[[response]]
-file = "{data}/measured/capture_1_0_inch.npz"
-background = "median"
-time_zero_file = "{data}/measured/capture_direct.npz"
-weight = 0.30
-delay_s = 9e-9
-[[response]]
-file = "{data}/measured/capture_3_0_inch.npz"
-background = "median"
-time_zero_file = "{data}/measured/capture_direct.npz"
-weight = 0.5
-delay_s = 20e-9
-"""
 
 
 def data_folder() -> Path | None:
@@ -44,8 +20,9 @@ def composite_scene(folder: Path) -> str | None:
     data = data_folder()
     if data is None or not (data / "measured" / "capture_direct.npz").is_file():
         return None
+    stated = Path(__file__).with_name("composite.toml").read_text(encoding="utf-8")
     path = folder / "composite.toml"
-    path.write_text(COMPOSITE.format(data=data), encoding="utf-8")
+    path.write_text(stated.replace("{data}", str(data)), encoding="utf-8")
     return str(path)
 
 

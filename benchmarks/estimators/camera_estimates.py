@@ -116,9 +116,14 @@ def _single_rad(measured: Measured, b: NDArray[Any]) -> NDArray[Any] | None:
     return np.asarray(np.mod(np.angle(b[1]), 2 * np.pi))
 
 
-def _bound_m(measured: Measured, separation_m: float) -> float:
+def first_return_std_m(measured: Measured, separation_m: float) -> float:
+    """Return the least standard deviation of the nearer return's distance, in m."""
     phase_rad, weight = _returns(measured, separation_m)
     variance = np.full(measured.multiples[-1] + 1, np.inf)  # of what is not measured
     variance[list(measured.multiples)] = (NOISE * weight.sum()) ** 2
     bound = tm.noise.cramer_rao(phase_rad, weight, tm.noise.MomentNoise(variance))
-    return float(0.674490 * bound.phase_std_rad[0] * measured.radian_m)
+    return float(bound.phase_std_rad[0] * measured.radian_m)
+
+
+def _bound_m(measured: Measured, separation_m: float) -> float:
+    return 0.674490 * first_return_std_m(measured, separation_m)

@@ -5,15 +5,13 @@ TOFcam660, so that none depends on the machine.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-import transientcam_moments as tm
 from benchmarks.common.tables import Table
 from benchmarks.estimators import camera_estimates, camera_pairs
-from benchmarks.estimators.camera_estimates import FIRST_M, NOISE, RATIO
+from benchmarks.estimators.camera_estimates import Measured, first_return_std_m
 from transientcam_driver import Sequence, SubPhases, open_camera
 from transientcam_driver.cameras.tofcam660._image import FULL_SCALE_DN
 from transientcam_server.imaging import Recipe
@@ -23,33 +21,13 @@ SEPARATIONS_M: Final = (0.3, 0.6, 1.2, 2.4, 5.0)
 HALL: Final = "tofcam660:emulated?scene=hall&settle_s=0&seed=1"
 
 
-@dataclass(frozen=True)
-class Frequencies:
-    """What a camera measures: m multiples of f."""
-
-    name: str
-    base_hz: float
-    harmonics: int
-
-
 CAMERAS: Final = (
-    Frequencies("TOFcam660, 7 MHz x 1..4", 7e6, 4),
-    Frequencies("TOFcam660, 3.5 MHz x 1..8", 3.5e6, 8),
-    Frequencies("TOFcam660, 14 MHz x 1..2", 14e6, 2),
-    Frequencies("prototype of the paper, 23 MHz x 1..3", 23e6, 3),
-    Frequencies("prototype of the paper, 23 MHz x 1..4", 23e6, 4),
+    Measured("TOFcam660, 7 MHz x 1..4", 7e6, (1, 2, 3, 4)),
+    Measured("TOFcam660, 3.5 MHz x 1..8", 3.5e6, tuple(range(1, 9))),
+    Measured("TOFcam660, 14 MHz x 1..2", 14e6, (1, 2)),
+    Measured("prototype of the paper, 23 MHz x 1..3", 23e6, (1, 2, 3)),
+    Measured("prototype of the paper, 23 MHz x 1..4", 23e6, (1, 2, 3, 4)),
 )
-
-
-def first_return_std_m(camera: Frequencies, separation_m: float) -> float:
-    """Return the least standard deviation of the nearer return's distance, in m."""
-    radian_m = tm.range_m(np.float64(1.0), camera.base_hz)
-    phase_rad = np.array([FIRST_M, FIRST_M + separation_m]) / radian_m
-    weight = np.array([1.0, RATIO])
-    variance = np.full(camera.harmonics + 1, (NOISE * weight.sum()) ** 2)
-    variance[0] = 0.0
-    bound = tm.noise.cramer_rao(phase_rad, weight, tm.noise.MomentNoise(variance))
-    return float(bound.phase_std_rad[0] * radian_m)
 
 
 def table() -> Table:

@@ -14,12 +14,9 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.common.tables import Table, heads
+from benchmarks.estimators.camera_estimates import NOISE, RATIO, Measured
 from transientcam_moments.reconstruction import automatic
 
-NOISE: Final = 0.01
-"""Standard deviation of each real part of a moment of three frequencies, over all light."""
-RATIO: Final = 0.5
-"""Of the second return's light to the first one's."""
 CORNER_M, APART_M = (0.1, 0.6), (0.6, 2.4)
 FAR_M: Final = 5.0
 WRONG_M: Final = 0.5
@@ -28,29 +25,24 @@ _Array = NDArray[Any]
 
 
 @dataclass(frozen=True)
-class Frequencies:
-    """What a camera measures: these multiples of a base frequency."""
-
-    camera: str
-    base_hz: float
-    multiples: tuple[int, ...]
+class Frequencies(Measured):
+    """What a camera measures, and what it tells; `NOISE` is that of three frequencies."""
 
     @property
     def period_m(self) -> float:
         """Unambiguous range of one return."""
-        return float(tm.range_m(np.float64(2 * np.pi), self.base_hz))
+        return 2 * np.pi * self.radian_m
 
     def range_m(self, returns_m: _Array, weights: tuple[float, ...]) -> _Array:
         """Return the range (P) of the first of some returns (K, P), by its automatic estimator."""
-        radian_m = self.period_m / (2 * np.pi)
         j = np.array(self.multiples)[:, None, None]
         light = np.array(weights)[:, None]
-        b = (light * np.exp(1j * j * returns_m / radian_m)).sum(axis=1)
+        b = (light * np.exp(1j * j * returns_m / self.radian_m)).sum(axis=1)
         sigma = NOISE * np.sqrt(len(self.multiples) / 3) * sum(weights)
         drawn = np.random.default_rng(7).normal(size=(2, *b.shape)) * sigma
         b = b + drawn[0] + 1j * drawn[1]
         if len(self.multiples) == 1:
-            return np.asarray(np.remainder(np.angle(b[0]), 2 * np.pi)) * radian_m
+            return np.asarray(np.remainder(np.angle(b[0]), 2 * np.pi)) * self.radian_m
         noise = tm.noise.MomentNoise(np.full(b.shape, sigma**2))
         name = automatic(self.multiples)
         if name == "likelihood":
@@ -59,7 +51,7 @@ class Frequencies:
             found = tm.two_returns(b, noise, harmonics=self.multiples).separate()
         else:
             found = tm.unwrap(b, noise, harmonics=self.multiples).separate()
-        return np.asarray(found.phase_rad) * radian_m
+        return np.asarray(found.phase_rad) * self.radian_m
 
     def errors_m(self, apart_m: tuple[float, float] | None) -> _Array:
         """Return by how much the first range is wrong, at random ranges up to `FAR_M`."""
@@ -95,17 +87,16 @@ def table() -> Table:
     )
     for each in CAMERAS:
         one, corner, two = (np.abs(each.errors_m(apart)) for apart in (None, CORNER_M, APART_M))
-        consecutive = each.multiples[-1] == len(each.multiples) > 1
         width_ns = 1e9 / (each.base_hz * 2 * len(each.multiples))
         made.rows.append(
             (
-                each.camera,
+                each.name,
                 each.period_m,
                 float(np.nanmedian(one)) * 1e3,
                 float(np.mean(~(one < WRONG_M))),
                 float(np.nanmedian(corner)) * 1e3,
                 float(np.nanmedian(two)) * 1e3,
-                f"{width_ns:.1f}" if consecutive else "no",
+                f"{width_ns:.1f}" if each.consecutive and len(each.multiples) > 1 else "no",
             )
         )
     made.notes.append(

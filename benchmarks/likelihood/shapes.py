@@ -17,7 +17,6 @@ BASE_HZ: Final = 23e6
 NOISE_SHARE: Final = 1 / 200
 ORDERS: Final = (3, 4, 6)
 SHAPES: Final = (1, 2, 3, 4)
-SPEED_M_S: Final = 299_792_458.0
 CORNELL_STEP: Final = 3
 """Every third pixel of each axis of the rendering is looked at."""
 SEED: Final = 1
@@ -73,7 +72,7 @@ def _row(responses: Responses, m: int) -> tuple[str, ...]:
     b = responses.moments(m)
     noise = tm.noise.MomentNoise(np.full(b.shape, NOISE_SHARE**2))
     noisy = tm.noise.draw(b, noise, np.random.default_rng(SEED), draws=1)[:, 0]
-    truth = SPEED_M_S * responses.first_s / 2
+    truth = tm.SPEED_OF_LIGHT_M_S * responses.first_s / 2
     found = ranges(noisy, tm.Settings(base_frequency_hz=BASE_HZ), noise=noise)
     columns = [found["maximum-entropy"], found["pisarenko"]]
     for shape in SHAPES:
@@ -133,5 +132,5 @@ def _rendered(data: Path | None) -> Iterator[Responses]:
     peak &= soft[:, 1:-1] > 0.1 * soft.max(axis=1, keepdims=True)
     known = peak.any(axis=1)
     first = peak[known].argmax(axis=1) + 1
-    time_s = (start + step * np.arange(300)) / SPEED_M_S
+    time_s = (start + step * np.arange(300)) / tm.SPEED_OF_LIGHT_M_S
     yield Responses("Cornell box, rendered", time_s, light[known], time_s[first])

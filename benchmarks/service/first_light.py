@@ -5,19 +5,18 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import httpx
 from playwright.sync_api import sync_playwright
 
 import transientcam
 from benchmarks.common.daemon import VIDEO, daemon
 from benchmarks.common.tables import Table, heads, percentiles
-
-SETTLE_S = 5.0
-"""Before the measurement: until the kernels are loaded and the new sequence's frames come."""
+from benchmarks.service.throughput import viewed
+from benchmarks.service.viewers import ViewerRecord
 
 
 @dataclass(frozen=True)
@@ -27,23 +26,6 @@ class Start:
     address_s: float
     range_map_s: float
     on_screen_s: float
-
-
-@dataclass(frozen=True)
-class Streamed:
-    """What one client saw in ``duration_s`` and what the daemon spent on it."""
-
-    duration_s: float
-    frames: int
-    missing: int
-    dropped: int
-    cpu_s: float
-    latencies_ms: list[float]
-
-    @property
-    def rate_hz(self) -> float:
-        """Frames a second, by the client's clock."""
-        return self.frames / self.duration_s
 
 
 def measure_start(cache: Path) -> Start:
@@ -62,33 +44,12 @@ def measure_start(cache: Path) -> Start:
     return Start(running.address_s, range_map_s, on_screen_s)
 
 
-def measure_stream(cache: Path, *, duration_s: float) -> Streamed:
-    """Return what a client gets that takes range and coefficients for ``duration_s``."""
-    environment = {"NUMBA_CACHE_DIR": str(cache)}
-    with daemon(environment=environment) as running, transientcam.Camera(running.url) as camera:
-        applied = camera.configure(**VIDEO)
-        latencies_ms, numbers = [], set()
-        with camera.stream("range", "coefficients") as frames:
-            settled_s = time.perf_counter() + SETTLE_S
-            frame = frames.receive()
-            while (
-                frame.meta["sequence_id"] != applied["sequence_id"]
-                or frame.product != "coefficients"
-                or time.perf_counter() < settled_s
-            ):
-                frame = frames.receive()
-            before = len(frames.notices)
-            cpu_s, start_s = running.cpu_s(), time.perf_counter()
-            while time.perf_counter() - start_s < duration_s:
-                frame = frames.receive()
-                if frame.product == "coefficients":  # the second of the two products of a frame
-                    numbers.add(frame.frame)
-                    latencies_ms.append(1e3 * (time.time() - frame.meta["host_time_s"]))
-            elapsed_s, spent_s = time.perf_counter() - start_s, running.cpu_s() - cpu_s
-            notices = list(frames.notices)[before:]
-    dropped = sum(int(notice.details["count"]) for notice in notices if notice.kind == "dropped")
-    missing = max(numbers) - min(numbers) + 1 - len(numbers)
-    return Streamed(elapsed_s, len(numbers), missing, dropped, spent_s, latencies_ms)
+def measure_stream(cache: Path, *, duration_s: float) -> tuple[ViewerRecord, float, float]:
+    """Return what a client gets of range and coefficients, in which time, and what that costs."""
+    with daemon(environment={"NUMBA_CACHE_DIR": str(cache)}) as running:
+        httpx.put(f"{running.url}/api/v1/sequence", json=VIDEO).raise_for_status()
+        running.settle()
+        return viewed(running, "range", "coefficients", duration_s=duration_s)
 
 
 def tables(*, stream_s: float = 60.0, starts: int = 3) -> Iterator[Table]:
@@ -111,14 +72,16 @@ def tables(*, stream_s: float = 60.0, starts: int = 3) -> Iterator[Table]:
             [_row("cold", cold), _row("warm", warm)],
             text=[f"Median (and range) of {starts} cold and {starts} warm starts:"],
         )
-        seen = measure_stream(caches[0], duration_s=stream_s)
+        seen, took_s, cpu_s = measure_stream(caches[0], duration_s=stream_s)
     columns = heads(
         "for, s:.0f | frames/s:.2f | frames missing | drops reported | "
         "daemon's share of one core:.0% | last image's arrival to client, median / 99 %, ms"
     )
-    share = seen.cpu_s / seen.duration_s
-    latency = percentiles(seen.latencies_ms, (50, 99))
-    row = (seen.duration_s, seen.rate_hz, seen.missing, seen.dropped, share, latency)
+    numbers = set(seen.numbers)
+    missing = max(numbers) - min(numbers) + 1 - len(numbers)
+    # of the second of the two products of a frame
+    latency = percentiles([1e3 * each for each in seen.latencies_s[1::2]], (50, 99))
+    row = (took_s, len(numbers) / took_s, missing, seen.dropped, cpu_s / took_s, latency)
     text = "Streaming range and coefficients to one client, simulation included:"
     yield Table("", columns, [row], text=[text])
 

@@ -16,8 +16,7 @@ from typing import Final
 import transientcam
 from benchmarks.common.daemon import Process, daemon
 from benchmarks.common.tables import Cell, Table, heads, percentiles
-from benchmarks.service.viewers import Viewer, cut, watch
-from transientcam import wire
+from benchmarks.service.viewers import RANGE, Viewer, cut, spending, watch
 
 RELAYS: Final = 4
 VIDEO: Final = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 5e-4}
@@ -49,8 +48,7 @@ def relay_on(port: int, origin: Process, running: ExitStack) -> Process:
 
 def viewers_of(process: Process, count: int) -> list[Viewer]:
     """Return viewers of range."""
-    subscribe = wire.Subscribe((wire.Subscription("range"),)).to_document()
-    return [Viewer(process.stream_url, subscribe) for _ in range(count)]
+    return [Viewer(process.stream_url, RANGE) for _ in range(count)]
 
 
 def observe(
@@ -58,11 +56,7 @@ def observe(
 ) -> tuple[Cell, ...]:
     """Return what a daemon spends while all viewers look, and how old frames are for them."""
     watch(viewers, duration_s=SETTLE_S)
-    for each in viewers:
-        each.begin_anew()
-    cpu_s = process.cpu_s()
-    elapsed_s = watch(viewers, duration_s=duration_s)
-    spent_s = process.cpu_s() - cpu_s
+    elapsed_s, spent_s = spending(process, viewers, duration_s=duration_s)
     latencies = _percentiles([latency_s for each in viewers for latency_s in each.seen.latencies_s])
     held_mib = process.resident_bytes() / 2**20
     return what, len(viewers), spent_s / elapsed_s, held_mib, latencies

@@ -20,13 +20,12 @@ from benchmarks.common.tables import Table, met
 from benchmarks.recordings import kills as killing
 from benchmarks.service.soak import Sample
 from benchmarks.service.viewers import Viewer, cut, watch
+from transientcam import wire
 from transientcam.stream_state import Reconnect
 
-SUBSCRIBE = {
-    "type": "subscribe",
-    "v": 1,
-    "subscriptions": [{"product": "range"}, {"product": "coefficients"}],
-}
+SUBSCRIBE = wire.Subscribe(
+    (wire.Subscription("range"), wire.Subscription("coefficients"))
+).to_document()
 SEEN_BAR_S = 1.0
 BACK_BAR_S = 5.0
 END_BAR_S = 5.0

@@ -17,9 +17,8 @@ import numpy as np
 
 from benchmarks.common.daemon import VIDEO, Process, daemon
 from benchmarks.common.tables import Cell, Table, percentiles
-from benchmarks.service.viewers import Viewer, cut, watch
+from benchmarks.service.viewers import RANGE, Viewer, cut, spending, watch
 
-RANGE = {"type": "subscribe", "v": 1, "subscriptions": [{"product": "range"}]}
 SAMPLE_S = 5.0
 RECORDING_S = 60.0
 SETTLE_S = 120.0
@@ -116,14 +115,10 @@ def soak(*, minutes: float, viewers: int, directory: Path) -> Soak:
 
         try:
             watch(watching, duration_s=SETTLE_S, every_s=SAMPLE_S, meanwhile=look)
-            for each in watching:
-                each.begin_anew()
-            cpu_s = process.cpu_s()
             begin_s = process.age_s()
-            duration_s = watch(
-                watching, duration_s=60.0 * minutes, every_s=SAMPLE_S, meanwhile=look
+            duration_s, cpu_s = spending(
+                process, watching, duration_s=60.0 * minutes, every_s=SAMPLE_S, meanwhile=look
             )
-            cpu_s = process.cpu_s() - cpu_s
         finally:
             cut(each.connection for each in watching)
             recorder.stop()

@@ -24,7 +24,7 @@ from websockets.exceptions import ConnectionClosed
 import transientcam
 from benchmarks.common.daemon import VIDEO, Process, daemon, running
 from benchmarks.common.tables import Cell, Table, heads, met, percentiles
-from benchmarks.service.viewers import Viewer, cut, stuck, watch
+from benchmarks.service.viewers import RANGE, Viewer, cut, spending, stuck, watch
 from transientcam import wire
 from transientcam_driver import open_camera
 from transientcam_server.api import build_app
@@ -39,11 +39,8 @@ FLOOD_S = 2.0
 FLOOD_ROUNDS = 3
 GONE_WITHIN_S = 30.0
 """The promise on viewers that are stuck."""
-
-
-def subscribe(start: int | None = None) -> dict[str, Any]:
-    """Return the message that subscribes to range."""
-    return wire.Subscribe((wire.Subscription("range"),), start=start).to_document()
+ALL = wire.Subscribe((wire.Subscription("range"),), start=1).to_document()
+"""The message that subscribes to range from the first frame on."""
 
 
 # -- what the stream carries -------------------------------------------------------------------
@@ -109,13 +106,9 @@ class Flood:
 
     def take(self, url: str, process: Process, *, viewers: int) -> None:
         """Measure one round."""
-        several = [Viewer(url, subscribe(start=1), look=False) for _ in range(viewers)]
+        several = [Viewer(url, ALL, look=False) for _ in range(viewers)]
         watch(several, duration_s=0.5)
-        for viewer in several:
-            viewer.begin_anew()
-        cpu_s = process.cpu_s()
-        elapsed_s = watch(several, duration_s=FLOOD_S)
-        spent_s = process.cpu_s() - cpu_s
+        elapsed_s, spent_s = spending(process, several, duration_s=FLOOD_S)
         cut(viewer.connection for viewer in several)
         messages = sum(viewer.seen.messages for viewer in several)
         self.bytes_s.append(sum(viewer.seen.received_bytes for viewer in several) / elapsed_s)
@@ -146,7 +139,7 @@ def _one_message(url: str) -> bytes:
 
     protocols: Any = [wire.SUBPROTOCOL]
     with connect(url, subprotocols=protocols, compression=None, max_size=None) as connection:
-        connection.send(wire.pack(subscribe(start=1)))
+        connection.send(wire.pack(ALL))
         connection.recv()  # hello
         data = connection.recv()
         assert isinstance(data, bytes)
@@ -160,8 +153,7 @@ def measure_travel(width: int, height: int, *, duration_s: float) -> tuple[float
     """Return the frames a second that one viewer of range sees, and how long each took, in ms."""
     with daemon("--camera", f"sim:mirrors?width={width}&height={height}") as process:
         viewer = _settled_viewer(process)
-        viewer.begin_anew()
-        elapsed_s = watch([viewer], duration_s=duration_s)
+        elapsed_s, _ = spending(process, [viewer], duration_s=duration_s)
         viewer.connection.close()
     latencies_ms = [1e3 * latency_s for latency_s in viewer.seen.latencies_s]
     return len(latencies_ms) / elapsed_s, latencies_ms
@@ -171,7 +163,7 @@ def _settled_viewer(process: Process) -> Viewer:
     """Return a viewer of a camera that delivers video and has nothing left to compile."""
     with transientcam.Camera(process.url) as camera:
         camera.configure(**VIDEO)
-        viewer = Viewer(process.stream_url, subscribe())
+        viewer = Viewer(process.stream_url, RANGE)
         while camera.info["kernels"]:
             watch([viewer], duration_s=SETTLE_S)
     return viewer
@@ -207,10 +199,10 @@ def measure_load(*, viewers: int, stuck_viewers: int, duration_s: float) -> tupl
     with daemon() as process, transientcam.Camera(process.url) as camera:
         first = _settled_viewer(process)
         url = process.stream_url
-        healthy = [first, *(Viewer(url, subscribe()) for _ in range(viewers - stuck_viewers - 1))]
+        healthy = [first, *(Viewer(url, RANGE) for _ in range(viewers - stuck_viewers - 1))]
         watch(healthy, duration_s=SETTLE_S)
         alone = _observe(process, camera, healthy, [], duration_s=duration_s / 4.0)
-        sockets = [stuck(url, subscribe()) for _ in range(stuck_viewers)]
+        sockets = [stuck(url, RANGE) for _ in range(stuck_viewers)]
         beside = _observe(process, camera, healthy, sockets, duration_s=duration_s)
         cut([*(viewer.connection for viewer in healthy), *sockets])
     return alone, beside
@@ -224,16 +216,14 @@ def _observe(
     *,
     duration_s: float,
 ) -> Load:
-    for viewer in healthy:
-        viewer.begin_anew()
-    begin_s, cpu_s = time.perf_counter(), process.cpu_s()
+    begin_s = time.perf_counter()
     gone_s: list[float] = []
 
     def look() -> None:
         if sockets and not gone_s and camera.info["clients"] <= len(healthy):
             gone_s.append(time.perf_counter() - begin_s)
 
-    elapsed_s = watch(healthy, duration_s=duration_s, meanwhile=look)
+    elapsed_s, cpu_s = spending(process, healthy, duration_s=duration_s, meanwhile=look)
     seen = [viewer.seen for viewer in healthy]
     first, last = min(each.numbers[0] for each in seen), max(each.numbers[-1] for each in seen)
     return Load(
@@ -245,7 +235,7 @@ def _observe(
         dropped=sum(each.dropped for each in seen),
         missing=sum(each.missing for each in seen),
         captured=last - first + 1,
-        cpu_s=process.cpu_s() - cpu_s,
+        cpu_s=cpu_s,
         resident_bytes=process.resident_bytes(),
         gone_s=gone_s[0] if gone_s else None,
     )

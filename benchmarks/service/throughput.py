@@ -22,7 +22,7 @@ from benchmarks.common.machine import commit_of
 from benchmarks.common.recordings import record
 from benchmarks.common.records import ROOT
 from benchmarks.common.tables import Table, heads, met
-from benchmarks.service.viewers import Viewer, ViewerRecord, cut, watch
+from benchmarks.service.viewers import Viewer, ViewerRecord, cut, spending, watch
 from transientcam_driver import Sequence
 
 SIZES: Final = ((163, 120), (640, 480))
@@ -95,10 +95,7 @@ def viewed(
     """Return what one viewer saw, in which time, and what the daemon spent in it."""
     viewer = Viewer(process.stream_url, _subscribe(*products, computed=computed))
     watch([viewer], duration_s=_SETTLE_S)
-    viewer.begin_anew()
-    before_s = process.cpu_s()
-    elapsed_s = watch([viewer], duration_s=duration_s)
-    spent_s = process.cpu_s() - before_s
+    elapsed_s, spent_s = spending(process, [viewer], duration_s=duration_s)
     cut([viewer.connection])
     return viewer.seen, elapsed_s, spent_s
 

@@ -7,7 +7,7 @@ import selectors
 import socket
 import struct
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,8 +17,11 @@ from websockets.frames import Frame as WebSocketFrame, Opcode
 from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
+from benchmarks.common.daemon import Process
 from transientcam import wire
 
+RANGE = wire.Subscribe((wire.Subscription("range"),)).to_document()
+"""The message that subscribes to range."""
 _CHUNK_BYTES = 1 << 18
 _KEPT_BYTES = 2048
 """Of each message: enough for everything before the array."""
@@ -196,6 +199,20 @@ def watch(
                 if not key.data.read(buffer):
                     selector.unregister(key.fileobj)
         return time.perf_counter() - begin_s
+
+
+def spending(
+    process: Process, viewers: Sequence[Viewer], *, duration_s: float, **how: Any
+) -> tuple[float, float]:
+    """Let viewers begin anew, and return how long they read and what a daemon spent then, in s.
+
+    ``how``: As of `watch`.
+    """
+    for viewer in viewers:
+        viewer.begin_anew()
+    before_s = process.cpu_s()
+    elapsed_s = watch(viewers, duration_s=duration_s, **how)
+    return elapsed_s, process.cpu_s() - before_s
 
 
 def stuck(url: str, subscribe: dict[str, Any]) -> socket.socket:

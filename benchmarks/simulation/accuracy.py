@@ -12,16 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common.tables import Table, heads
-from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
+from benchmarks.simulation.scenes import (
+    BUILT_IN,
+    READOUT_S,
+    START_S,
+    scene_named,
+    unseen,
+    world_before,
+)
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
-from transientcam_simulation.emulated import world_of
 from transientcam_simulation.imaging import World
-from transientcam_simulation.scene import Scene
 
-READOUT_S = 3.98e-3
-START_S = 9.0  # a visitor is there
-SIZE = 163, 120
 SEQUENCES = {
     "video": Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005),
     "m = 4 x 20": Sequence(harmonics=4, takes=20),
@@ -56,7 +58,7 @@ class Accuracy:
 def measure(name: str, sequence_name: str) -> Accuracy:
     """Compare moments of the automatic choice with those of everything, nothing, and many rays."""
     scene, sequence = scene_named(name), SEQUENCES[sequence_name]
-    automatic = _world(scene, scene.effects, sequence)
+    automatic = world_before(scene, {}, sequence)
     there = tuple(
         effect
         for effect in OF_IMAGES
@@ -64,8 +66,7 @@ def measure(name: str, sequence_name: str) -> Accuracy:
         if effect != "distortion" or (scene.camera is not None and scene.camera.lens.bends)
     )
     everything, nothing = (
-        _world(scene, scene.effects | dict.fromkeys(there, choice), sequence)
-        for choice in ("on", "off")
+        world_before(scene, dict.fromkeys(there, choice), sequence) for choice in ("on", "off")
     )
     found = _moments(automatic, sequence)
     brightness = automatic.truth(device_time_s=START_S).brightness.ravel()
@@ -82,13 +83,6 @@ def measure(name: str, sequence_name: str) -> Accuracy:
         _difference(found - _moments(everything, sequence), deviation_e, lit),
         _difference(found - _moments(nothing, sequence), deviation_e, lit),
     )
-
-
-def _world(scene: Scene, effects: dict[str, str], sequence: Sequence) -> World:
-    changed = replace(scene, effects=effects)
-    world = world_of(changed, width=SIZE[0], height=SIZE[1], readout_s=READOUT_S)
-    world.configure(sequence, sequence.labels)
-    return world
 
 
 def _moments(world: World, sequence: Sequence) -> Moments:

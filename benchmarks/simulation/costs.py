@@ -10,19 +10,17 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from benchmarks.common.tables import Cell, Column, Table, heads
-from benchmarks.simulation.scenes import scene_named
+from benchmarks.simulation.scenes import READOUT_S, SIZE, scene_named, world_before
 from transientcam_driver import Sequence
 from transientcam_simulation.compiled import IMAGE_KERNELS
 from transientcam_simulation.effects import EFFECTS
-from transientcam_simulation.emulated import world_of
 from transientcam_simulation.imaging import World
 from transientcam_simulation.scene import Scene
 
 VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
-READOUT_S = 3.98e-3
 BARRED = ("wall", "corner", "mirrors", "visitor")
 SCENES = (*BARRED, "ball", "corner-left", "translucent", "calibration")
-SIZES = ((163, 120), (640, 480))
+SIZES = (SIZE, (640, 480))
 OPTIONAL = tuple(effect.name for effect in EFFECTS if effect.optional)
 _ENOUGH_S = 1.5
 
@@ -50,8 +48,7 @@ class Scenes:
 def measure(scene: Scene, effects: Mapping[str, str], size: tuple[int, int]) -> Cost:
     """Build a world and make frames."""
     start_s = time.process_time()
-    world = _world(scene, effects, size)
-    world.configure(VIDEO, VIDEO.labels)
+    world = world_before(scene, effects, VIDEO, size)
     open_s = time.process_time() - start_s
     frame = _frames(world)
     frame()  # what is computed once
@@ -61,15 +58,6 @@ def measure(scene: Scene, effects: Mapping[str, str], size: tuple[int, int]) -> 
         frame()
         times_s.append(time.process_time() - start_s)
     return Cost(open_s, statistics.median(times_s))
-
-
-def _world(scene: Scene, effects: Mapping[str, str], size: tuple[int, int]) -> World:
-    changed = {name: effects.get(name, scene.effects.get(name, "auto")) for name in OPTIONAL}
-    fields = {name: getattr(scene, name) for name in Scene.__slots__}
-    width, height = size
-    return world_of(
-        Scene(**(fields | {"effects": changed})), width=width, height=height, readout_s=READOUT_S
-    )
 
 
 def _frames(world: World) -> Callable[[], None]:
@@ -93,7 +81,7 @@ def measure_scenes(names: tuple[str, ...], size: tuple[int, int]) -> list[Scenes
     for name in names:
         scene = scene_named(name)
         off, on = dict.fromkeys(OPTIONAL, "off"), dict.fromkeys(OPTIONAL, "on")
-        explained = _world(scene, {}, size).explain(name, VIDEO)
+        explained = world_before(scene, {}, VIDEO, size).explain(name, VIDEO)
         built = tuple(each.effect for each in explained.effects if each.built)
         none, called = measure(scene, off, size), measure(scene, {}, size)
         results.append(Scenes(name, size, none, called, measure(scene, on, size), built))

@@ -5,7 +5,6 @@ camera give on average, less what the tracer says of them, in units of the noise
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -14,12 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common.tables import Table, heads
-from benchmarks.simulation.accuracy import READOUT_S, SEQUENCES, SIZE, START_S
+from benchmarks.simulation.accuracy import SEQUENCES
 from benchmarks.simulation.path_tracer import REPETITIONS, Tracer
-from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
+from benchmarks.simulation.scenes import (
+    BUILT_IN,
+    READOUT_S,
+    SIZE,
+    START_S,
+    scene_named,
+    unseen,
+    world_before,
+)
 from transientcam_driver.sequence import ImageLabel, Sequence
 from transientcam_simulation.effects import EFFECTS, LightEffect
-from transientcam_simulation.emulated import world_of
 from transientcam_simulation.scene import Scene
 
 _CERTAIN = 3  # standard errors of the tracer: what chance puts beyond, in 0.3 % of the moments
@@ -75,13 +81,7 @@ def judge(scene: Scene, sequence_name: str, by: Told) -> Verdict:
     sequence = SEQUENCES[sequence_name]
     of_light = [each.name for each in EFFECTS if issubclass(each, LightEffect)]
     others = {each.name: "off" for each in EFFECTS if each.optional and each.name not in of_light}
-    world = world_of(
-        replace(scene, effects={**scene.effects, **others}),
-        width=SIZE[0],
-        height=SIZE[1],
-        readout_s=READOUT_S,
-    )
-    world.configure(sequence, sequence.labels)
+    world = world_before(scene, others, sequence)
     period_s = sequence.exposure_s + READOUT_S
     scale_e = scene.light.electrons_per_s * sequence.exposure_s
     gain = world.conditions(sequence).sub_phase_gain(1)

@@ -6,7 +6,6 @@ are solved at steps of time, are held against a full solution for every image.
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -14,30 +13,18 @@ from numpy.typing import NDArray
 
 from benchmarks.common.tables import Cell, Table, heads
 from benchmarks.simulation.accuracy import SEQUENCES, four_buckets
-from benchmarks.simulation.costs import READOUT_S
-from benchmarks.simulation.scenes import scene_named
+from benchmarks.simulation.scenes import READOUT_S, SIZE, START_S, scene_named, world_before
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
 from transientcam_simulation.compiled import IMAGE_KERNELS
-from transientcam_simulation.emulated import world_of
-from transientcam_simulation.imaging import World
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.scene import Scene
 
 SCENES = ("visitor", "ball", "carousel", "passage", "slowest")
-SIZE = 163, 120
 FRAMES = 40
-START_S = 9.0  # the visitor is there
 _ONE_RAY = {"mixed-pixels": "off"}  # as the full solution has
-
-
-def _world(scene: Scene, choices: dict[str, str], sequence: Sequence) -> World:
-    changed, (width, height) = replace(scene, effects=scene.effects | choices), SIZE
-    world = world_of(changed, width=width, height=height, readout_s=READOUT_S)
-    world.configure(sequence, sequence.labels)
-    return world
 
 
 def costs_s(scene: Scene, sequence: Sequence) -> tuple[float, float, float]:
@@ -45,7 +32,9 @@ def costs_s(scene: Scene, sequence: Sequence) -> tuple[float, float, float]:
 
     Frames with it and without it are made in turn.
     """
-    worlds = [_world(scene, {"interreflection": choice}, sequence) for choice in ("auto", "off")]
+    worlds = [
+        world_before(scene, {"interreflection": choice}, sequence) for choice in ("auto", "off")
+    ]
     took_s: list[list[float]] = []
     period_s = sequence.exposure_s + READOUT_S
     for frame in range(FRAMES + 1):
@@ -69,7 +58,7 @@ def error(scene: Scene, sequence: Sequence) -> tuple[float, float, float]:
     """
     width, height = SIZE
     lit, dark = (
-        _world(scene, _ONE_RAY | {"interreflection": choice}, sequence)
+        world_before(scene, _ONE_RAY | {"interreflection": choice}, sequence)
         for choice in ("auto", "off")
     )
     conditions = lit.conditions(sequence)
@@ -118,7 +107,7 @@ def tables(*, small: bool = False) -> Iterator[Table]:
     for name in SCENES:
         for title in list(SEQUENCES)[: 1 if small else None]:
             scene, sequence = scene_named(name), SEQUENCES[title]
-            call = _world(scene, {}, sequence).calls(sequence)["interreflection"]
+            call = world_before(scene, {}, sequence).calls(sequence)["interreflection"]
             taken: tuple[Cell, ...] = (None, None, None)
             if title == "video":
                 taken = tuple(1e3 * each_s for each_s in costs_s(scene, sequence))

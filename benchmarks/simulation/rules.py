@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from benchmarks.common.tables import Table
-from benchmarks.simulation.costs import READOUT_S, VIDEO
-from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
+from benchmarks.simulation.costs import VIDEO
+from benchmarks.simulation.scenes import BUILT_IN, READOUT_S, scene_named, unseen
 from transientcam_simulation.cli.explain import scenes_table
 from transientcam_simulation.effects import EFFECTS
 from transientcam_simulation.emulated import world_of

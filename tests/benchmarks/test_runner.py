@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import __main__ as runner
-from benchmarks.catalogue import MEASUREMENTS, Measurement
+from benchmarks.catalogue import MEASUREMENTS
 from benchmarks.common.records import Record
 from benchmarks.common.tables import Table
 
@@ -94,9 +94,3 @@ def test_an_unknown_name_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_name_means_a_measurement_or_a_page_and_not_both() -> None:
     for name in MEASUREMENTS:
         assert name in [each.name for each in runner.chosen([name])]
-
-
-def test_given_options_go_before_the_functions_own(asked: Asked) -> None:
-    measurement = Measurement("y:z", given={"minutes": 7.0})
-    runner.run(measurement, runner.function_of(measurement), {}, write=False)
-    assert asked["minutes"] == 7.0
