@@ -20,8 +20,6 @@ from transientcam_server.camera import (
     Acquisition,
     CalibrationStore,
     Calibrator,
-    CameraLostEvent,
-    CameraRecoveredEvent,
     Captured,
     Change,
     Dark,
@@ -30,12 +28,9 @@ from transientcam_server.camera import (
     Jobs,
     Lease,
     LeaseManager,
-    LightArmingEvent,
-    LightConfirmedEvent,
     LightGuard,
     LightOffEvent,
     LightRules,
-    LightUnconfirmedEvent,
     OriginChanged,
     OriginLease,
     SequenceChanged,
@@ -76,22 +71,12 @@ from transientcam_server.settings import ReconstructionSettings, Settings
 _log = logging.getLogger("transientcam_server.service")
 VERSION: Final = version("transientcam")
 _CLOSING_S = 1.0
-_TURN_S = 0.2
 _WORKERS_END_S = 1.0
 _OPEN_S = 5.0
 _KEPT_S = 0.1
 """An answer to what switched the light off waits for the disk no longer."""
 _NOISE_FRAMES: Final = 16
 """So many frames after another the noise of the images is held against the stated sensor's."""
-_SAME_NOISE: Final = 1.2
-_NOTICES: Final[Mapping[type[Event], str]] = {
-    CameraLostEvent: "camera-lost",
-    CameraRecoveredEvent: "camera-back",
-    LightArmingEvent: "light-arming",
-    LightUnconfirmedEvent: "light-unconfirmed",
-    LightConfirmedEvent: "light-confirmed",
-}
-"""Events of which clients are told no more than their fields."""
 WORKER_THREADS: Final = "worker"
 """What the names of their threads begin with."""
 
@@ -182,27 +167,18 @@ class Service:
         self._light = LightGuard(unserved_s=rules.unserved_s, unused_s=rules.unused_s)
         unit = rules.unit if self.relay is None else f"relay:{self.relay.url}"
         self._darkness = None if unit is None else Darkness(settings.light.directory, unit)
-        self.acquisition = (
-            Acquisition(
-                camera,
-                report=self._from_acquisition,
-                light=self._light,
-                delay_s=rules.delay_s,
-                darkness=self._darkness,
-                supervision=Supervision(camera, silence_s=settings.limits.unserved_s),
+        how: dict[str, Any] = {"report": self._from_acquisition, "light": self._light}
+        how |= {"darkness": self._darkness}
+        self.origin_lease: OriginLease | None = None
+        if self.relay is None:
+            watching = Supervision(camera, silence_s=settings.limits.unserved_s)
+            self.acquisition = Acquisition(
+                camera, delay_s=rules.delay_s, supervision=watching, **how
             )
-            if self.relay is None
-            else SharedAcquisition(
-                self.relay,
-                report=self._from_acquisition,
-                light=self._light,
-                darkness=self._darkness,
-            )
-        )
+        else:
+            self.acquisition = SharedAcquisition(self.relay, **how)
+            self.origin_lease = OriginLease(self.relay, self.acquisition)
         self.hub.obstacle = lambda: self.acquisition.status().obstacle
-        self.origin_lease = (
-            None if self.relay is None else OriginLease(self.relay, self.acquisition)
-        )
         self.applied: AppliedSequence = camera.applied
         self.jobs = Jobs(
             report=lambda job: self.hub.notify("job-changed", {"job": job.to_document()})
@@ -259,7 +235,9 @@ class Service:
         self._light.turned()
         self._light.used()
         self.acquisition.start(dark=dark)
-        turning = asyncio.create_task(self._keep_light())
+        turning = asyncio.create_task(
+            self._light.keep(used=self._is_used, reads=lambda: self.hub.reads)
+        )
         try:
             yield
         finally:
@@ -369,12 +347,10 @@ class Service:
     def _from_acquisition(self, event: Event) -> None:
         """Carry an event from the acquisition's thread to the loop."""
         assert self._loop is not None  # noqa: S101 - the thread is started after it is set
+        # first, so that no frame can be missing from the past of a recording that begins now
+        self._loop.call_soon_threadsafe(self._happened, event)
         if isinstance(event, Captured):
-            # first, so that no frame can be missing from the past of a recording that begins now
-            self._loop.call_soon_threadsafe(self._happened, event)
             self.recordings.offer(event.raw, event.applied)
-        else:
-            self._loop.call_soon_threadsafe(self._happened, event)
 
     async def record(
         self, options: RecordingOptions, *, history_s: float | None, frame: int | None = None
@@ -508,7 +484,7 @@ class Service:
                 self._notify_sequence_changed()
                 self._notify_calibration(before)
             case _:
-                self.hub.notify(_NOTICES[type(event)], asdict(event))
+                self.hub.notify(event.notice, asdict(event))
 
     def _adopt_calibration(self) -> None:
         """Calibrate as the origin does from the next frame on, unless a file was given here."""
@@ -539,28 +515,12 @@ class Service:
 
     async def _check_noise(self, frame: Frame) -> None:
         """Notify clients when the images of a frame are not as noisy as their sensor is stated."""
-        ratio = await frame.noise_ratio()
-        if ratio is None:
-            return
-        differs = not 1 / _SAME_NOISE <= ratio <= _SAME_NOISE
-        if differs != self._noise_differs:
-            self._noise_differs, reason = differs, None
-            if differs:
-                reason = (
-                    f"The images scatter {ratio:.2f} times as much as the stated sensor's would"
-                )
+        ratio, reason = await frame.noise()
+        if ratio is not None and self._noise_differs != (reason is not None):
+            self._noise_differs = reason is not None
+            if reason is not None:
                 _log.warning("%s", reason)
             self.hub.notify("noise-differs", {"ratio": ratio, "reason": reason})
-
-    async def _keep_light(self) -> None:
-        """Prove to the camera's thread, again and again, that clients are served and use it."""
-        reads = self.hub.reads
-        while True:
-            self._light.turned()
-            if self._is_used() or self.hub.reads != reads:
-                self._light.used()
-            reads = self.hub.reads
-            await asyncio.sleep(_TURN_S)
 
     def _is_used(self) -> bool:
         """Return whether somebody needs the capture, other than for single frames."""

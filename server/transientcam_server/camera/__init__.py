@@ -20,9 +20,7 @@ from transientcam_server.camera._events import (
     Captured,
     Event,
     LightArmingEvent,
-    LightConfirmedEvent,
     LightOffEvent,
-    LightUnconfirmedEvent,
     OriginChanged,
     SequenceChanged,
 )

@@ -1,6 +1,7 @@
-"""What the acquisition reports."""
+"""What the acquisition reports; clients are told events with a ``notice`` by their fields."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.camera._darkness import Dark
@@ -18,6 +19,7 @@ class Captured:
 class CameraLostEvent:
     """The camera is unplugged or does not respond."""
 
+    notice: ClassVar = "camera-lost"
     reason: str
 
 
@@ -25,11 +27,14 @@ class CameraLostEvent:
 class CameraRecoveredEvent:
     """A lost camera works again."""
 
+    notice: ClassVar = "camera-back"
+
 
 @dataclass(frozen=True, slots=True)
 class LightArmingEvent:
     """The light goes on after this time, unless it is switched off before."""
 
+    notice: ClassVar = "light-arming"
     in_s: float
 
 
@@ -44,12 +49,15 @@ class LightOffEvent:
 class LightUnconfirmedEvent:
     """The light was to go off, and that takes long to be confirmed: it may be on."""
 
+    notice: ClassVar = "light-unconfirmed"
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class LightConfirmedEvent:
     """`LightUnconfirmedEvent` has ended: the light is off, or it was started again."""
+
+    notice: ClassVar = "light-confirmed"
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ event loop that serves clients writes here, the thread that owns the camera read
 not depend on the loop.
 """
 
+import asyncio
 import math
 import time
 from collections.abc import Callable
@@ -12,12 +13,13 @@ from typing import Final
 
 LATE_S: Final = 0.1
 """After a lease has lapsed: the loop, which says so to clients, has so long to act first."""
+_TURN_S: Final = 0.2
 
 
 class LightGuard:
     """What the light needs to stay on.
 
-    Each method is one assignment or reads each value once, so that no thread waits for another.
+    Each value is assigned or read in one step, so that no thread waits for another.
 
     ``unserved_s``: for so long the clients' loop may not turn.
     ``unused_s``: for so long a capture may go on that nobody uses.
@@ -50,6 +52,19 @@ class LightGuard:
     def used(self) -> None:
         """Note that somebody uses the capture, or has just started it; from any thread."""
         self._used_s = self._clock()
+
+    async def keep(self, *, used: Callable[[], bool], reads: Callable[[], int]) -> None:
+        """Prove to the camera's thread, again and again, that clients are served and use it.
+
+        ``used``: Whether somebody needs the capture, but for single frames: ``reads`` counts those.
+        """
+        before = reads()
+        while True:
+            self.turned()
+            if used() or reads() != before:
+                self.used()
+            before = reads()
+            await asyncio.sleep(_TURN_S)
 
     # -- from the thread of the camera ---------------------------------------------------------
 

@@ -53,6 +53,7 @@ MAX_WHOLE_BYTES = 24 * 1024 * 1024
 _REMEMBERED_BYTES: Final = STREAMED_BYTES
 _REMEMBERED_TIME_AXES: Final = 2
 _REMEMBERED_CROPS: Final = 32
+_SAME_NOISE: Final = 1.2
 
 
 class Frame:
@@ -121,12 +122,18 @@ class Frame:
             past=True,
         )
 
-    async def noise_ratio(self) -> float | None:
-        """Return `tm.Reconstruction.noise_ratio`; None also while nothing is computed."""
+    async def noise(self) -> tuple[float | None, str | None]:
+        """Return `tm.Reconstruction.noise_ratio`, and in words that it is not 1, if it is not.
+
+        The ratio is None also while nothing is computed.
+        """
         found = self._computed.reconstruction
         if found is None:
-            return None
-        return (await self._workers.run_long(lambda: found.noise_ratio))[0]
+            return None, None
+        ratio, _ = await self._workers.run_long(lambda: found.noise_ratio)
+        if ratio is None or 1 / _SAME_NOISE <= ratio <= _SAME_NOISE:
+            return ratio, None
+        return ratio, f"The images scatter {ratio:.2f} times as much as the stated sensor's would"
 
     @property
     def shape(self) -> tuple[int, int]:
