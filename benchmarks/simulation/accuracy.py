@@ -29,7 +29,15 @@ SEQUENCES = {
     "m = 4 x 20": Sequence(harmonics=4, takes=20),
     "m = 6 x 8": Sequence(harmonics=6, takes=8),
 }
-OF_LIGHT = ("distortion", "mirror-paths", "gloss", "interreflection", "scattering", "mixed-pixels")
+OF_LIGHT = (
+    "distortion",
+    "mirror-paths",
+    "glass",
+    "gloss",
+    "interreflection",
+    "scattering",
+    "mixed-pixels",
+)
 OF_IMAGES = (*OF_LIGHT, "motion")
 
 Moments = NDArray[np.complex128]

@@ -3,8 +3,9 @@
 It judges the simulation, and so shares nothing with it but the reading of a scene's file: hits,
 shadows, reflections, lobes, motions and the lens are stated here anew. A path starts at a random
 place in its pixel, is sent on at random by each surface that it meets, and takes the lamp's light
-at each of them, straight and over every chain of mirrors. Random numbers are Sobol's, shifted
-anew in each of several repetitions, whose spread is the standard error.
+at each of them, straight and over every chain of mirrors. A pane turns it, lets it go on or is dust
+by chance. Random numbers are Sobol's, shifted anew in each of several repetitions, whose spread is
+the standard error.
 """
 
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ LIGHT_M_S = 299_792_458.0
 REPETITIONS = 8
 _CLEAR_M = 1e-7  # from where a ray starts, nothing nearer is met
 _DIMENSIONS = 20  # of Sobol's numbers; later ones are plain random
+_AT_PANES = 16  # first of two after the pixel's, for the panes that a path meets at once
 _MOST_MIRRORS = 16
 _MOST_SCATTERINGS = 64
 _ROULETTE_AFTER = 2  # scatterings, from which on weak paths end at random
@@ -45,6 +47,26 @@ class _Part:
     normal: Points | None = None
     sides: tuple[Points, Points] | None = None
     opaque: Mask | None = None
+    pane: tuple[float, float, float | None] | None = None
+
+    def splits(self, way: Points) -> tuple[Values, Values, Values]:
+        """Of a pane: shares of light that are mirrored and pass, and what the glass adds to it.
+
+        Amplitudes by Fresnel's sine and tangent laws; one face after the other, without phases.
+        """
+        assert self.pane is not None
+        assert self.normal is not None
+        index, thick, given = self.pane
+        angle = np.arccos(np.abs(way @ self.normal).clip(1e-6, 1 - 1e-9))
+        inside = np.arcsin(np.sin(angle) / index)
+        s = (np.sin(angle - inside) / np.sin(angle + inside)) ** 2
+        p = (np.tan(angle - inside) / np.tan(angle + inside)) ** 2
+        both = s + (1 - s) ** 2 * s / (1 - s * s) + p + (1 - p) ** 2 * p / (1 - p * p)
+        mirrored: Values = both / 2
+        if given is not None:
+            mirrored = np.full(len(way), given)
+        clean, later = 1 - self.share, thick * (index * np.cos(inside) - np.cos(angle))
+        return clean * mirrored, clean * (1 - mirrored), later
 
     def hit(self, start: Points, way: Points) -> Values:
         """Length along unit vectors to the surface; infinite where it is not met."""
@@ -91,7 +113,8 @@ class Tracer:
     ) -> None:
         assert scene.camera is not None
         self._camera, self._size = scene.camera, size
-        self._parts = [_part(scene, index, time_s) for index in range(len(scene.surfaces))]
+        tables = [k for k, each in enumerate(scene.surfaces) if each.kind != "dust"]
+        self._parts = [_part(scene, index, time_s) for index in tables]
         self._lamp = scene.light.position_m
         self._axis = _unit(scene.light.aim_at_m - self._lamp)
         self._beam = scene.light.beam_exponent
@@ -101,9 +124,12 @@ class Tracer:
         self._chains = list(self._image_lamps(min(self._mirrors, 8)))
         kinds = [each.kind for each in self._parts]
         # the last entry is of no surface, -1
-        self._mirror = np.array([*(kind == "mirror" for kind in kinds), False])
+        self._mirror = np.array([*(kind in ("mirror", "glass") for kind in kinds), False])
+        self._panes = [each for each in self._parts if each.pane]
+        self._pane = np.array([*(kind == "glass" for kind in kinds), False])
         self._scatters = np.array([*(kind in ("diffuse", "translucent") for kind in kinds), False])
-        self._share = np.array([*(each.share for each in self._parts), 0.0])
+        # what is dust of a pane, or mirrors there, does it by chance, and then wholly
+        self._share = np.array([*(1.0 if each.pane else each.share for each in self._parts), 0.0])
         self._gloss = np.array([*(each.gloss for each in self._parts), 0.0])
         self._exponent = np.array([*(each.exponent for each in self._parts), 0.0])
         self._enters = any(any(each.spread_s) for each in self._parts)
@@ -147,15 +173,29 @@ class Tracer:
         length, weight = np.zeros(count), np.ones(count)
         late = np.ones((count, len(frequencies_hz) if self._enters else 0), dtype=np.complex128)
         scatterings, mirrors = np.zeros(count, int), np.zeros(count, int)
-        alive = np.arange(count)
+        alive, leg = np.arange(count), -1
         while alive.size:
+            leg += 1
             at, which = self.first_hit(start, way)
             point = start + np.where(which < 0, 0.0, at)[:, None] * way
             normal = self._normals(point, which)
             front = np.einsum("pc,pc->p", normal, way) < 0
             length = length + at
-            turned = front & self._mirror[which] & (mirrors < self._mirrors)
-            on = front & self._scatters[which]
+            # -- a pane has two fronts, and is a mirror, white dust, or nothing, by chance
+            pane = self._pane[which]
+            normal[pane & ~front] *= -1
+            front |= pane
+            dust, passes = np.zeros((2, len(alive)), dtype=bool)
+            own = numbers[alive, _AT_PANES + leg : _AT_PANES + leg + 1].ravel()
+            chance = own if own.size or not self._panes else random.random(len(alive))
+            for index in np.flatnonzero(self._pane):
+                mine, of = np.flatnonzero(which == index), self._parts[index]
+                mirrored, _, later = of.splits(way[mine])
+                dust[mine] = chance[mine] < of.share
+                passes[mine] = chance[mine] >= of.share + mirrored
+                length[mine] += np.where(passes[mine], later, 0.0)
+            turned = front & self._mirror[which] & (mirrors < self._mirrors) & ~dust & ~passes
+            on = (front & self._scatters[which]) | dust
             # -- what a scattering surface sends along the path, of the lamp's light
             p, n, k, back = point[on], normal[on], which[on], -way[on]
             if self._enters:
@@ -185,7 +225,7 @@ class Tracer:
             slope = np.einsum("pc,pc->p", normal, way)
             way[turned] -= 2 * slope[turned, None] * normal[turned]
             weight[turned] *= self._share[which[turned]]
-            kept = (on | turned) & (weight > 0)
+            kept = (on | turned | passes) & (weight > 0)
             alive, start, way = alive[kept], point[kept], way[kept]
             length, weight, late = length[kept], weight[kept], late[kept]
             scatterings, mirrors = scatterings[kept], mirrors[kept]
@@ -200,12 +240,21 @@ class Tracer:
             nearest[closer], which[closer] = at[closer], index
         return nearest, which
 
-    def _clear(self, start: Points, way: Points, length: Values) -> Mask:
-        """Whether nothing is nearer than a length; the surface where the ray ends is not."""
-        clear = np.ones(len(way), dtype=bool)
+    def _clear(self, start: Points, way: Points, length: Values) -> tuple[Values, Values]:
+        """Share of light that comes along lengths, 0 or 1 but for panes, and what glass adds.
+
+        The surface where the ray ends does not count.
+        """
+        share, more = np.ones(len(way)), np.zeros(len(way))
         for part in self._parts:
-            clear &= part.hit(start, way) > length - _CLEAR_M
-        return clear
+            nearer = part.hit(start, way) <= length - _CLEAR_M
+            if part.pane:
+                _, passes, later = part.splits(way[nearer])
+                share[nearer] *= passes
+                more[nearer] += later
+            else:
+                share[nearer] = 0
+        return share, more
 
     def _normals(self, point: Points, which: NDArray[np.intp]) -> Points:
         normals = np.zeros_like(point)
@@ -245,8 +294,9 @@ class Tracer:
                 ((index, *chain), image - 2 * depth * part.normal)
                 for chain, image in found
                 for index, part in enumerate(self._parts)
-                if part.kind == "mirror" and part.normal is not None and chain[:1] != (index,)
-                if (depth := float((image - part.centre) @ part.normal)) > 0
+                if part.kind in ("mirror", "glass") and part.normal is not None
+                if chain[:1] != (index,)
+                if (depth := float((image - part.centre) @ part.normal)) > 0 or part.pane
             ]
 
     def _lamp_on(self, point: Points, normal: Points) -> Iterator[tuple[Values, Values, Points]]:
@@ -259,16 +309,20 @@ class Tracer:
             lit = np.flatnonzero(received)
             if chain:
                 lit = lit[self._parts[chain[0]].hit(point[lit], towards[lit]) < far[lit]]
-            start, way = point[lit], towards[lit]
+            start, way, share, left = point[lit], towards[lit], np.ones(len(lit)), far[lit]
             for index in chain:
-                at, which = self.first_hit(start, way)
-                mirror = self._parts[index].normal
-                kept = (which == index) & (way @ mirror < 0)
-                lit, way = lit[kept], way[kept]
+                part = self._parts[index]
+                at, mirror = part.hit(start, way), part.normal
+                kept = (at < left) & ((way @ mirror < 0) | bool(part.pane))
+                clear, more = self._clear(start[kept], way[kept], at[kept])
+                lit, way, share, left = lit[kept], way[kept], share[kept] * clear, (left - at)[kept]
+                far[lit] += more
                 start = start[kept] + at[kept, None] * way
+                share = share * (part.splits(way)[0] if part.pane else part.share)
                 way = way - 2 * (way @ mirror)[:, None] * mirror
-            left = np.linalg.norm(self._lamp - start, axis=1)
-            share = np.prod([self._share[index] for index in chain]) * self._clear(start, way, left)
+            clear, more = self._clear(start, way, np.linalg.norm(self._lamp - start, axis=1))
+            far[lit] += more
+            share = share * clear
             share = share * ((-way @ self._axis).clip(0) ** self._beam if self._beam else 1.0)
             irradiance = np.zeros(len(point))
             irradiance[lit] = received[lit] * share
@@ -341,8 +395,11 @@ def _part(scene: Scene, index: int, time_s: float) -> _Part:
     stated: dict[str, Any] = {
         "kind": surface.kind,
         "centre": centre,
-        "share": surface.reflectivity,
+        "share": surface.glass.dust if surface.glass else surface.reflectivity,
         "gloss": surface.gloss,
+        "pane": (g.refractive_index, g.thickness_m, g.reflectivity)
+        if (g := surface.glass)
+        else None,
         "exponent": surface.gloss_exponent,
         "spread_s": (0.0, 0.0) if scatter is None else (scatter.width_s, scatter.decay_s),
     }

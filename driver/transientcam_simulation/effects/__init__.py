@@ -22,6 +22,7 @@ from transientcam_simulation.effects._effect import (
 from transientcam_simulation.effects._glimpses import Facts, Glimpse, Noise, Values
 from transientcam_simulation.effects._in_scene import (
     DiffuseInterreflection,
+    GlassPanes,
     Gloss,
     MirrorPaths,
     MixedPixels,
@@ -57,7 +58,7 @@ NOISE = (ShotNoise, ReadNoise)
 """Switched off by ``noise=off``."""
 
 EFFECTS: tuple[type[Effect], ...] = (
-    Distortion, MirrorPaths, Gloss, DiffuseInterreflection, Scattering, MixedPixels,
+    Distortion, MirrorPaths, GlassPanes, Gloss, DiffuseInterreflection, Scattering, MixedPixels,
     MotionDuringSequence, MotionBlur, ModulationHarmonics, AmbientLight, AmplitudeRollOff,
     LensScatter, Vignetting, PixelPattern, DarkCurrentElectrons, ThermalDrift,
     SynchronisationOutliers, Saturation, *NOISE, Quantisation,

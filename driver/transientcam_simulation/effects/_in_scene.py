@@ -46,6 +46,15 @@ class MirrorPaths(_InGeometry):
     where = "{share} of the pixels see light over mirrors"
 
 
+class GlassPanes(_InGeometry):
+    """Rays part at panes, and light is less and later behind them."""
+
+    name = "glass"
+    what = "what panes let through, mirror and scatter"
+    without = "no pane stands in the scene"
+    where = "{share} of the pixels see light that has met a pane"
+
+
 class Gloss(_InGeometry):
     """A lobe around the direction of reflection, as of a dull mirror."""
 

@@ -18,7 +18,7 @@ from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._subpixel import PIXELS, may_be_thin
-from transientcam_simulation.light._variants import without_gloss, without_mirrors
+from transientcam_simulation.light._variants import without_glass, without_gloss, without_mirrors
 from transientcam_simulation.scene import (
     Points,
     Rectangle,
@@ -102,7 +102,7 @@ class SceneFacts:
     def _glimpses(self) -> tuple[Glimpse, ...]:
         cosine = cosine_to_axis(self._camera, self._rays(self._camera))
         return tuple(
-            Glimpse(each.lits[0].weight.sum(axis=0), each.lits[0].reflectance, cosine, self._shape)
+            Glimpse(each.lits[0].weight.sum(axis=0), each.lits[0].shown, cosine, self._shape)
             for each in self._seen
         )
 
@@ -153,8 +153,12 @@ class SceneFacts:
         surfaces, camera, there = self._scene.surfaces, self._camera, self._seen
         variants: dict[str, tuple[bool, Callable[[], list[list[_SampledView]]]]] = {
             "mirror-paths": (
-                any(each.kind == "mirror" for each in surfaces),
+                bool(self._scene.mirrors),
                 lambda: [[self._look(without_mirrors(each.scene), camera) for each in there]],
+            ),
+            "glass": (
+                bool(self._scene.panes),
+                lambda: [[self._look(without_glass(each.scene), camera) for each in there]],
             ),
             "gloss": (
                 any(each.gloss for each in surfaces),
@@ -382,7 +386,7 @@ class SceneFacts:
         transport = self._scene.transport
         scattering = [self._scene.surfaces[k].shape for k in patch_edges_m(self._scene, 1)]
         flat = len(scattering) == 1 and isinstance(scattering[0], Rectangle)
-        flat = flat and not any(each.kind == "mirror" for each in self._scene.surfaces)
+        flat = flat and not self._scene.mirrors
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
         return tuple(_ROUGH_ERROR * self._further(each, self._rough) for each in self._seen)

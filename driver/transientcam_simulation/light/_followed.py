@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._graded import graded
-from transientcam_simulation.light._paths import Lit, light_rays
+from transientcam_simulation.light._paths import Lit, joined, light_rays
 from transientcam_simulation.light._rays import RAYS, camera_rays, rays_within
 from transientcam_simulation.scene import Scene
 
@@ -93,15 +93,7 @@ def _both(one: Within, other: Within) -> Within:
 
 def _side_by_side(one: Lit, pixels: int, other: Lit, more: int) -> Lit:
     """Join the rays in some pixels and those in others, place by place."""
-    merged = {}
-    for name in Lit.__slots__:
-        first, second = getattr(one, name), getattr(other, name)
-        axis = 1 if name in ("delay_s", "weight") else 0  # of the rays
-        shape, inner = first.shape[:axis], first.shape[axis + 1 :]
-        parts = (
-            first.reshape(*shape, -1, pixels, *inner),
-            second.reshape(*shape, -1, more, *inner),
-        )
-        joined = np.concatenate(parts, axis=axis + 1)
-        merged[name] = joined.reshape(*shape, -1, *inner)
-    return Lit(**merged)
+    count = len(one.surface)
+    first = np.arange(count).reshape(-1, pixels)
+    second = count + np.arange(len(other.surface)).reshape(-1, more)
+    return joined([one, other]).part(np.concatenate([first, second], axis=1).ravel())

@@ -16,7 +16,7 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import ask
 from transientcam_simulation.effects import Glimpse, Values
 from transientcam_simulation.light._graded import graded
-from transientcam_simulation.light._over_gloss import around, of_surfaces, sent_by_gloss, some
+from transientcam_simulation.light._over_gloss import around, of_surfaces, sent_by_gloss
 from transientcam_simulation.light._paths import (
     RayEnds,
     first_scattering,
@@ -24,6 +24,7 @@ from transientcam_simulation.light._paths import (
     image_lights,
     light_on,
     light_rays,
+    some,
 )
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._variants import without_scattering
@@ -88,6 +89,11 @@ class SampledWays:
             sent = weight * factor
             goes = np.flatnonzero(sent > 0)
             ends = first_scattering(scene, ends.point[goes] + 1e-9 * way[goes], way[goes])
+            if scene.panes:  # which part paths: by chance so many go on as light is left
+                left = ends.throughput * (ends.albedo + of_surfaces(scene, "gloss")[ends.surface])
+                kept = np.flatnonzero(random.random(len(left)) < left)
+                ends = some(ends, kept)
+                ends.throughput[:] /= left[kept]
             on = goes[ends.ray]
             # a mirror turns rays
             over, glossy = over[on] | (ends.direction != way[on]).any(axis=1), glossy[on] | lobe[on]

@@ -6,7 +6,7 @@ where a mirror would show the lamp.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -26,6 +26,7 @@ from transientcam_simulation.light._paths import (
     light_on,
     light_on_ends,
     scatter_of,
+    some,
 )
 from transientcam_simulation.scene import Points, Rectangle, Scene
 
@@ -68,11 +69,6 @@ def sent_by_gloss(scene: Scene, ends: RayEnds, places: Values) -> tuple[Points, 
 def of_surfaces(scene: Scene, name: str) -> Values:
     """Return a figure of each surface."""
     return np.array([getattr(surface, name) for surface in scene.surfaces], dtype=float)
-
-
-def some(ends: RayEnds, index: NDArray[np.intp]) -> RayEnds:
-    """Return the ends of some rays, as they are."""
-    return RayEnds(*(getattr(ends, each.name)[index] for each in fields(ends)))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import ask
 from transientcam_simulation.light._patches import Patches, contour
-from transientcam_simulation.light._paths import unobstructed
+from transientcam_simulation.light._paths import at_panes, unobstructed
 from transientcam_simulation.scene import Scene, Surface
 
 _BLOCK = 1 << 18  # pairs of patches at a time
@@ -29,11 +29,12 @@ class OverMirrors:
     @classmethod
     def of(cls, scene: Scene, patches: Patches) -> "OverMirrors":
         """Find what mirrors show to the middles of patches."""
-        mirrors = [each for each in scene.surfaces if each.kind == "mirror"]
         found: list[tuple[NDArray[Any], ...]] = []
         for bounces in range(1, scene.mirror_bounces + 1):
-            for chain in product(mirrors, repeat=bounces):
-                if all(one is not other for one, other in pairwise(chain)):
+            for chain in product(scene.mirrors, repeat=bounces):
+                if not any(
+                    one.mirror.centre is other.mirror.centre for one, other in pairwise(chain)
+                ):
                     found += _seen(scene, patches, chain)
         return cls(*map(np.concatenate, zip(*found, strict=True))) if found else NOTHING
 
@@ -69,7 +70,7 @@ def _seen(
         images.insert(0, each.mirror.mirrored(images[0]))
         corners = each.mirror.mirrored(corners)[:, ::-1]  # counter-clockwise again
         normal = each.mirror.mirrored_direction(normal)
-        reflectivity *= each.reflectivity
+        reflectivity *= each.reflectivity if each.glass is None else 1.0
     those = np.flatnonzero(there)
     these = np.flatnonzero(chain[0].mirror.in_front(patches.centre))
     rows = max(1, _BLOCK // max(1, len(those)))
@@ -86,5 +87,8 @@ def _seen(
         to, by, from_m = to[clear], by[clear], patches.centre[to[clear]]
         factors = reflectivity * contour(corners[by] - from_m[:, None], patches.normal[to])
         far_m = np.linalg.norm(images[0][by] - from_m, axis=-1)
+        if scene.panes:
+            share, later_m = at_panes(scene, chain, tuple(k[by] for k in images), from_m)
+            factors, far_m = factors * share, far_m + later_m
         pairs = zip((to, by, factors, far_m), ("i4", "i4", "f4", "f4"), strict=True)
         yield tuple(each.astype(kind) for each, kind in pairs)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import ask
-from transientcam_simulation.light._paths import blocked
+from transientcam_simulation.light._paths import at_panes, blocked
 from transientcam_simulation.scene import Cells, Points, Scene, cells_of, evenly, patch_edges_m
 
 Cuts = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -123,6 +123,8 @@ def form_factors(
             p, n = np.nonzero(seen > 0)
         corners = patches.corners[n] - at[block][p][:, None, :]
         factors[block][p, n] = contour(corners, normal[block][p]) * seen[p, n]
+        if scene.panes:
+            factors[block][p, n] *= at_panes(scene, (), (patches.centre[n],), at[block][p])[0]
     return factors
 
 

@@ -7,7 +7,7 @@ within its rectangle and nothing stands in between.
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -31,15 +31,16 @@ from transientcam_simulation.scene import (
 _BLOCK = 16384  # rays at a time, so that what is computed for them stays in the cache
 _NOWHERE_M = 1e-12
 FAR_M = 1e3  # longer than any path in a scene
+_MOST_ENDS = 8  # of a ray that panes part, the brightest; one pane makes three at most
 _BESIDE = 1.5  # sizes of a mirror, up to which pixels at its edge may see beside it
 
 
 @dataclass(frozen=True, slots=True)
 class RayEnds:
-    """The scattering points on which rays of the camera end, flat.
+    """The scattering points on which rays of the camera end, flat; several of one that panes part.
 
-    ``ray`` is the index of the ray, ``direction`` the way it comes along, ``throughput`` the share
-    of light left by mirrors on the way; ``normal`` and ``albedo`` are those at the points.
+    ``ray`` is its index, ``direction`` the way it comes along, ``throughput`` the share of light
+    left by mirrors and panes on the way; ``normal`` and ``albedo`` are those at the points.
     """
 
     ray: NDArray[np.intp]
@@ -70,7 +71,8 @@ class Lit:
     ``distance_m``: (P) its length.
     ``reflectance``: (P) share of the light on its end that it takes to the camera: albedo times
     mirrors.
-    ``delay_s``, ``weight``: (K, P) whole time of flight and brightness by each chain of mirrors.
+    ``delay_s``, ``weight``: (K, P) whole time of flight and brightness by each chain of mirrors,
+    for one end of the rays after the other where panes part them; ``more`` are the further ends.
     """
 
     surface: NDArray[np.intp]
@@ -79,6 +81,20 @@ class Lit:
     reflectance: NDArray[np.float64]
     delay_s: NDArray[np.float64]
     weight: NDArray[np.float64]
+    more: "tuple[Lit, ...]" = ()
+
+    @property
+    def surfaces(self) -> NDArray[np.intp]:
+        """Index of the surface that light comes from, (P), or (K, P) where rays have more ends."""
+        if not self.more:
+            return self.surface
+        ends = np.stack([self.surface, *(each.surface for each in self.more)])
+        return np.repeat(ends, len(self.weight) // len(ends), axis=0)
+
+    @property
+    def shown(self) -> NDArray[np.float64]:
+        """Reflectance (P) of all ends of each ray together."""
+        return sum((each.reflectance for each in self.more), start=self.reflectance)
 
     def moments(self, frequency_hz: float, scatter: Scatter | None) -> NDArray[np.complex128]:
         """``int g(tau) exp(2 pi i f tau) dtau`` of each ray (P), over all chains of mirrors."""
@@ -105,11 +121,12 @@ class Lit:
             self.reflectance[of],
             self.delay_s[:, of],
             self.weight[:, of],
+            tuple(each.part(of) for each in self.more),
         )
 
     def scatter(self, scene: Scene) -> Scatter | None:
         """Spread of each ray's light inside the surface it ends on; None if no surface has any."""
-        return scatter_of(scene, self.surface)
+        return scatter_of(scene, self.surfaces)
 
 
 def scatter_of(scene: Scene, surface: NDArray[np.integer]) -> Scatter | None:
@@ -142,10 +159,11 @@ def light_rays(scene: Scene, directions: Points) -> Lit:
     """Follow rays from the camera to their ends, and light to there, on all cores."""
     ask()
     lights = tuple(image_lights(scene))
+    parted = (3 if len(scene.mirrors) == 2 else _MOST_ENDS) if scene.panes else 1
 
     def follow(rays: Points) -> Lit:
         ends = first_scattering(scene, _camera(scene).position_m, rays)
-        return light_on_ends(scene, lights, ends, rays=len(rays))
+        return light_on_ends(scene, lights, ends, rays=len(rays), parted=parted)
 
     blocks = [directions[k : k + _BLOCK] for k in range(0, len(directions), _BLOCK)]
     if len(blocks) < 2:
@@ -163,11 +181,31 @@ def joined(parts: list[Lit]) -> Lit:
         np.concatenate([part.reflectance for part in parts]),
         np.concatenate([part.delay_s for part in parts], axis=1),
         np.concatenate([part.weight for part in parts], axis=1),
+        tuple(joined(list(each)) for each in zip(*(part.more for part in parts), strict=True)),
     )
 
 
-def light_on_ends(scene: Scene, lights: tuple[ImageLight, ...], ends: RayEnds, *, rays: int) -> Lit:
-    """Follow light to the ends of rays."""
+def some(ends: RayEnds, index: NDArray[Any]) -> RayEnds:
+    """Return the ends of some rays, as they are."""
+    return RayEnds(*(getattr(ends, each.name)[index] for each in fields(ends)))
+
+
+def light_on_ends(
+    scene: Scene, lights: tuple[ImageLight, ...], ends: RayEnds, *, rays: int, parted: int = 1
+) -> Lit:
+    """Follow light to the ends of rays, of each of which the ``parted`` brightest count."""
+    if parted > 1:
+        ends = some(ends, np.lexsort((-ends.throughput * ends.albedo, ends.ray)))
+        place = np.arange(len(ends.ray)) - np.searchsorted(ends.ray, ends.ray)
+        first, *rest = (
+            light_on_ends(scene, lights, some(ends, place == k), rays=rays) for k in range(parted)
+        )
+        return replace(
+            first,
+            delay_s=np.concatenate([each.delay_s for each in (first, *rest)]),
+            weight=np.concatenate([each.weight for each in (first, *rest)]),
+            more=tuple(replace(k, delay_s=k.delay_s[:0], weight=k.weight[:0]) for k in rest),
+        )
     lit = Lit(
         np.full(rays, -1),
         np.zeros((rays, 3)),
@@ -211,31 +249,47 @@ def _camera(scene: Scene) -> Viewpoint:
 
 
 def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
-    """Follow the camera's rays, over mirrors, to the scattering surface each one ends on."""
+    """Follow the camera's rays, over mirrors and parted by panes, to surfaces that scatter."""
     count = len(direction)
     start = np.broadcast_to(eye, direction.shape)
-    ray = np.arange(count)
+    ray, turns = np.arange(count), np.zeros(count, dtype=np.intp)
     distance_m, throughput = np.zeros(count), np.ones(count)
     ended: list[tuple[NDArray[Any], ...]] = []
     scatters = np.array([surface.scatters for surface in scene.surfaces] + [False])
-    reflects = np.array([surface.kind == "mirror" for surface in scene.surfaces] + [False])
-    for _bounce in range(scene.mirror_bounces + 1):
+    kinds = np.array([*(surface.kind for surface in scene.surfaces), ""])
+    clear, reflects = kinds == "glass", (kinds == "glass") | (kinds == "mirror")
+    dusty = clear & np.roll(kinds == "dust", -1)
+    for _leg in range((scene.mirror_bounces + 1) * (clear.sum() + 1)):
         met = first_hit(scene, start, direction)
-        point, which = met.point, met.surface
+        point, which, normal = met.point, met.surface, met.normal
         distance_m = distance_m + met.length_m
-        facing = np.einsum("pc,pc->p", met.normal, direction) < 0
-        end = scatters[which] & facing
-        of_rays = ray, point, which, distance_m, throughput, direction, met.normal, met.albedo
+        facing = np.einsum("pc,pc->p", normal, direction) < 0
+        through = clear[which]
+        end_on = which + dusty[which] * (2 - facing)  # a pane's dust follows it, of its front first
+        normal[through & ~facing] *= -1
+        facing |= through
+        end = scatters[end_on] & facing
+        of_rays = ray, point, end_on, distance_m, throughput, direction, normal, met.albedo
         ended.append(tuple(each[end] for each in of_rays))
-        on = reflects[which] & facing
-        if not on.any():
+        on = reflects[which] & facing & (turns < scene.mirror_bounces)
+        next_ones = np.concatenate([np.flatnonzero(on), np.flatnonzero(through)])
+        if not next_ones.size:
             break
-        ray, which, direction = ray[on], which[on], direction[on]
-        start, distance_m, throughput = point[on], distance_m[on], throughput[on]
+        turned = np.arange(next_ones.size) < np.count_nonzero(on)
+        ray, which, direction = ray[next_ones], which[next_ones], direction[next_ones]
+        start, distance_m = point[next_ones], distance_m[next_ones]
+        throughput, turns = throughput[next_ones], turns[next_ones] + turned
         for index in np.unique(which):
             mine, surface = which == index, scene.surfaces[index]
+            if surface.glass is None:
+                throughput[mine] *= surface.reflectivity
+            else:
+                cosine = np.abs(direction[mine] @ surface.mirror.normal)
+                mirrored, passed, later_m = surface.glass.shares(cosine)
+                throughput[mine] *= np.where(turned[mine], mirrored, passed)
+                distance_m[mine] += np.where(turned[mine], 0.0, later_m)
+            mine &= turned
             direction[mine] = surface.mirror.mirrored_direction(direction[mine])
-            throughput[mine] *= surface.reflectivity
     return RayEnds(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
 
 
@@ -257,6 +311,8 @@ def first_hit(scene: Scene, start: Points, direction: Points) -> FirstHits:
     nearest, which = np.full(len(direction), np.inf), np.full(len(direction), -1)
     end, triangle = start + FAR_M * direction, np.zeros(len(direction), dtype=np.intp)
     for index, surface in enumerate(scene.surfaces):
+        if surface.kind == "dust":
+            continue  # its pane is there
         if isinstance(surface.shape, Mesh):
             at, of_mesh = surface.shape.first_met(start, end)
             closer = at < nearest
@@ -282,7 +338,7 @@ def first_hit(scene: Scene, start: Points, direction: Points) -> FirstHits:
 
 def image_lights(scene: Scene) -> Iterator[ImageLight]:
     """Yield the light itself and its images in every chain of mirrors that it can enter."""
-    mirrors = [surface for surface in scene.surfaces if surface.kind == "mirror"]
+    mirrors = scene.mirrors
     axis = scene.light.aim_at_m - scene.light.position_m
     lights = [ImageLight((), (scene.light.position_m,), axis / np.linalg.norm(axis))]
     yield lights[0]
@@ -295,7 +351,7 @@ def image_lights(scene: Scene) -> Iterator[ImageLight]:
             )
             for light in lights
             for mirror in mirrors
-            if not any(mirror is last for last in light.mirrors[:1])
+            if not any(mirror.mirror.centre is last.mirror.centre for last in light.mirrors[:1])
             and mirror.mirror.in_front(light.positions_m[0])
             and _may_reach(light, mirror.mirror)
         ]
@@ -356,12 +412,39 @@ def light_on(
     received = np.maximum(cosine, 0) / distance_m**2
     received *= beam(scene.light, -towards @ light.axis)
     for mirror in light.mirrors:
-        received *= mirror.reflectivity
+        if mirror.glass is None:
+            received *= mirror.reflectivity
     shone_at = np.flatnonzero(received)
     reached = shone_at[unobstructed(scene, light.mirrors, light.positions_m, point[shone_at])]
     length_m[near] = distance_m
     irradiance[near[reached]] = received[reached]
+    if scene.panes:
+        share, later_m = at_panes(scene, light.mirrors, light.positions_m, point[reached])
+        irradiance[near[reached]] *= share
+        length_m[near[reached]] += later_m
     return length_m, irradiance
+
+
+def at_panes(
+    scene: Scene, mirrors: tuple[Surface, ...], images_m: tuple[Points, ...], point: Points
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what share panes leave of light on free ways (see `unobstructed`), and m they add."""
+    share, later_m, start = np.ones(len(point)), np.zeros(len(point)), point
+    for image_m, mirror in zip(images_m, (*mirrors, None), strict=True):
+        end = np.broadcast_to(image_m, point.shape)
+        if mirror is not None:
+            end = start + mirror.shape.hit(start, end)[:, None] * (end - start)
+        way = end - start
+        way = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), _NOWHERE_M)
+        for plane, glass in scene.panes:
+            on = np.flatnonzero(plane.hit(start, end) < 1 - 1e-9)
+            _, passed, more_m = glass.shares(np.abs(way[on] @ plane.normal))
+            share[on] *= passed
+            later_m[on] += more_m
+        if mirror is not None and mirror.glass is not None:
+            share *= mirror.glass.shares(np.abs(way @ mirror.mirror.normal))[0]
+        start = end
+    return share, later_m
 
 
 def normals_at(scene: Scene, point: Points, surface: NDArray[np.intp]) -> Points:
@@ -413,12 +496,12 @@ def unobstructed(
 
 
 def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
-    """Whether anything is between two points; the surfaces they lie on do not count."""
+    """Whether anything but panes is between two points; surfaces they lie on do not count."""
     blocked = np.zeros(len(start), dtype=bool)
     if not len(start):
         return blocked
     low, high = _box(start, end)
-    for surface in scene.surfaces:
+    for surface in (each for each in scene.surfaces if not each.passes):
         least, most = surface.shape.box
         if (most < low).any() or (least > high).any():
             continue  # nowhere near any of the segments

@@ -19,7 +19,7 @@ from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._followed import Within
 from transientcam_simulation.light._over_gloss import LOBE_RAYS, ShownByGloss
 from transientcam_simulation.light._patches import Patches
-from transientcam_simulation.light._paths import Lit
+from transientcam_simulation.light._paths import Lit, scatter_of
 from transientcam_simulation.light._rays import rays_within
 from transientcam_simulation.scene import Bilinear, Points, Scene
 
@@ -36,7 +36,7 @@ class Gathering:
     """
 
     def __init__(self, scene: Scene, patches: Patches, lit: Lit) -> None:
-        self._lit, self._scatter = lit, lit.scatter(scene)
+        self._lit, self._scatter = lit, scatter_of(scene, lit.surface)
         count = len(lit.surface)
         index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
         for surface, cells in patches.cells.items():
@@ -47,13 +47,15 @@ class Gathering:
                 )
                 index[mine] += patches.first[surface]
         self.places: Bilinear = index, weights
+        self._more = [Gathering(scene, patches, each) for each in lit.more]
 
     def moments(
         self, irradiance: NDArray[np.complexfloating], frequency_hz: float
     ) -> NDArray[np.complex128]:
         """Return the moments that the camera sees, given those on the patches."""
         on_pixel = np.einsum("pk,pk->p", self.places[1], irradiance[self.places[0]])
-        return np.asarray(on_pixel * self.way(frequency_hz), dtype=np.complex128)
+        seen = np.asarray(on_pixel * self.way(frequency_hz), dtype=np.complex128)
+        return sum((each.moments(irradiance, frequency_hz) for each in self._more), start=seen)
 
     def way(self, frequency_hz: float) -> NDArray[np.complex128]:
         """Return what the way to the camera makes of moments at the rays' ends."""

@@ -84,9 +84,9 @@ class StillLight:
     @cached_property
     def reflectance(self) -> NDArray[np.float32]:
         """(H W) of what the pixels see."""
-        reflectance = self.lit.reflectance.astype(np.float32)
+        reflectance = self.lit.shown.astype(np.float32)
         for each in self.fine:
-            reflectance[each.pixel] = each.of_pixels(each.rays.reflectance).mean(axis=0)
+            reflectance[each.pixel] = each.of_pixels(each.rays.shown).mean(axis=0)
         return reflectance
 
     @cached_property
@@ -97,7 +97,8 @@ class StillLight:
         for count in (self._rays_a_pixel, *RAYS_AT_EDGES):
             if not pixel.size:
                 break
-            rays = self._followed.within(pixel, _affordable(count, pixel.size))
+            planes = len(self.lit.weight) // 2 if self.lit.more else 1
+            rays = self._followed.within(pixel, _affordable(count, planes * pixel.size))
             unresolved = np.zeros(pixel.size, dtype=bool)
             if count != RAYS_AT_EDGES[-1]:
                 unresolved = self._unresolved(rays)
@@ -115,8 +116,9 @@ class StillLight:
         assert self._noise is not None  # noqa: S101  (or no pixel was mixed)
         surface, ways = few.of_pixels(rays.surface), few.of_pixels(rays.weight > 0)
         edge = (surface != surface[0]).any(axis=0) | (ways != ways[:, :1]).any(axis=(0, 1))
+        edge |= bool(self.scene.panes)  # whose edges take some of the light of a way
         brightness = few.of_pixels(rays.weight.sum(axis=0)).mean(axis=0)
-        reflectance = few.of_pixels(rays.reflectance).mean(axis=0)
+        reflectance = few.of_pixels(rays.shown).mean(axis=0)
         limit = _COUNTS_ABOVE * counts * self._noise.deviation(brightness, reflectance)
         scatter, counting = rays.scatter(self.scene), np.zeros(len(edge), dtype=bool)
         for frequency_hz in {0.0, self._highest_hz}:
@@ -169,17 +171,17 @@ class StillLight:
         """
         lit, scene = self.lit, self.scene
         delay_s, weight = [lit.delay_s], [lit.weight.copy()]
-        surfaces = [np.broadcast_to(lit.surface, lit.weight.shape)]
+        surfaces = [np.broadcast_to(lit.surfaces, lit.weight.shape)]
         if self.mixed.size:
             weight[0][:, self.mixed] = 0
-            present = {int(k) for each in self.fine for k in np.unique(each.rays.surface)}
+            present = {int(k) for each in self.fine for k in np.unique(each.rays.surfaces)}
             for surface in sorted(present - {-1}):
                 delay_s.append(np.zeros_like(lit.delay_s))
                 weight.append(np.zeros_like(lit.weight))
                 surfaces.append(np.full(lit.weight.shape, surface))
                 for each in self.fine:
                     fine = each.of_pixels(each.rays.weight)
-                    mine = np.where(each.of_pixels(each.rays.surface) == surface, fine, 0)
+                    mine = np.where(each.of_pixels(each.rays.surfaces) == surface, fine, 0)
                     total = mine.sum(axis=1)
                     late_s = (mine * each.of_pixels(each.rays.delay_s)).sum(axis=1)
                     delay_s[-1][:, each.pixel] = late_s / np.where(total > 0, total, 1)
@@ -199,7 +201,7 @@ class StillLight:
         the mirror wherever it would meet the mirror's plane.
         """
         shape = self.height, self.width
-        surfaces = self.scene.surfaces
+        surfaces = [each for each in self.scene.surfaces if not each.passes] or self.scene.surfaces
         sights: list[Sight] = []
         eye = self._camera.position_m
         start = np.broadcast_to(eye, self.rays.shape)
@@ -283,7 +285,7 @@ class StillLight:
         has; or where the surface changes, since light over further surfaces changes there too.
         """
         shape = self.height, self.width
-        deviation = noise.deviation(self.lit.weight.sum(axis=0), self.lit.reflectance)
+        deviation = noise.deviation(self.lit.weight.sum(axis=0), self.lit.shown)
         limit = _DIFFERS_ABOVE * deviation.reshape(shape)
         scatter = self.lit.scatter(self.scene)
         planes = [self.lit.moments(f, scatter).reshape(shape) for f in (0.0, highest_hz)]

@@ -15,6 +15,7 @@ from transientcam_simulation.effects import (
     DiffuseInterreflection,
     Distortion,
     Facts,
+    GlassPanes,
     Glimpse,
     Gloss,
     MirrorPaths,
@@ -34,6 +35,7 @@ from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.light._variants import (
     still_scene,
+    without_glass,
     without_gloss,
     without_mirrors,
     without_scattering,
@@ -316,6 +318,8 @@ class SurfaceScenery:
         scene = replace(scene, camera=replace(self._camera, lens=lens))
         if MirrorPaths.name not in effects:
             scene = without_mirrors(scene)
+        if GlassPanes.name not in effects:
+            scene = without_glass(scene)
         if Gloss.name not in effects:
             scene = without_gloss(scene)
         if Scattering.name not in effects:
@@ -341,8 +345,14 @@ def surface_seen(
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
     eye = scene.camera.position_m
     met = first_hit(scene, np.broadcast_to(eye, directions.shape), directions)
-    which, point = met.surface, met.point
+    which, point, length_m = met.surface, met.point, met.length_m
     facing = np.einsum("pc,pc->p", met.normal, directions) < 0
+    if scene.panes:  # what most light comes from, if that is straight ahead: their dust or behind
+        aside_m = np.linalg.norm(np.cross(lit.point - eye, directions), axis=-1)
+        at = np.array([*(bool(each.glass) for each in scene.surfaces), False])[which]
+        at &= (lit.surface >= 0) & (aside_m < 1e-6)
+        which, point = np.where(at, lit.surface, which), np.where(at[:, None], lit.point, point)
+        facing, length_m = facing | at, np.linalg.norm(point - eye, axis=-1)
     seen = facing & np.array([each.opaque is None for each in scene.surfaces] + [False])[which]
     from_lamp_m = np.linalg.norm(point - scene.light.position_m, axis=-1)
     # a ray that a mirror turns ends on another surface than the one it meets first
@@ -353,6 +363,6 @@ def surface_seen(
         direct[each.pixel] = np.where(mine, weight, 0.0).mean(axis=0)
     light = brightness.ravel()
     share = np.divide(direct, light, out=np.zeros_like(direct), where=(light > 0) & seen)
-    range_m = np.where(seen, (met.length_m + from_lamp_m) / 2, np.nan)
+    range_m = np.where(seen, (length_m + from_lamp_m) / 2, np.nan)
     shape = brightness.shape
     return SurfaceSeen(range_m.reshape(shape), np.minimum(share, 1.0).reshape(shape))

@@ -14,6 +14,11 @@ def without_mirrors(scene: Scene) -> Scene:
     return replace(scene, transport=replace(scene.transport, mirror_bounces=0))
 
 
+def without_glass(scene: Scene) -> Scene:
+    """Take panes away."""
+    return replace(scene, surfaces=tuple(each for each in scene.surfaces if not each.passes))
+
+
 def without_gloss(scene: Scene) -> Scene:
     """Make all surfaces matt."""
     surfaces = tuple(replace(each, gloss=0.0) for each in scene.surfaces)

@@ -1,6 +1,7 @@
 """Read scene files: TOML tables into a scene. Reading computes nothing."""
 
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import get_args
@@ -33,6 +34,7 @@ from transientcam_simulation.scene._motion import Motion, Repeat
 from transientcam_simulation.scene._scene import (
     Background,
     Diffuser,
+    Glass,
     Kind,
     Light,
     ResponseFile,
@@ -110,6 +112,9 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
     if sum(map(bool, (responses, surfaces, diffuser))) != 1:
         allowed = "given, or [[response]] or [diffuser] instead, but only one of them"
         raise top.error("surface", len(surfaces), allowed)
+    kinds = [surface.kind for surface in surfaces]
+    if "glass" in kinds and any(surface.motions for surface in surfaces):
+        raise top.error(f"surface[{kinds.index('glass')}].kind", "glass", "none if something moves")
     scene = Scene(
         name=name,
         description=description,
@@ -118,7 +123,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
         sensor=_sensor(top.table("sensor")),
         device=_device(top.table("device"), folder),
         camera=_viewpoint(top.table("camera")) if surfaces else None,
-        surfaces=surfaces,
+        surfaces=tuple(part for surface in surfaces for part in (surface, *_dust(surface))),
         transport=_transport(top.table("transport")),
         responses=responses,
         diffuser=diffuser,
@@ -318,7 +323,7 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
 
 
 def _surface(table: Table, motions: dict[str, Motion], folder: Path | None) -> Surface:
-    kind: Kind = table.choice("kind", get_args(Kind))
+    kind: Kind = table.choice("kind", get_args(Kind)[:-1])
     name = table.text("name", kind)
     shape, albedo = _shape(table, kind, folder)
     share = "reflectivity" if kind == "mirror" else "albedo"
@@ -335,6 +340,8 @@ def _surface(table: Table, motions: dict[str, Motion], folder: Path | None) -> S
         gloss,
         exponent,
     )
+    if kind == "glass":
+        surface = replace(surface, glass=_glass(table, dust=surface.reflectivity))
     if surface.reflectivity + gloss > 1 and surface.scatters:
         limit = f"at most {1 - surface.reflectivity:g}, what albedo leaves of the light"
         raise table.error("gloss", gloss, limit)
@@ -356,7 +363,8 @@ def _shape(table: Table, kind: Kind, folder: Path | None) -> tuple[Shape, float 
     if not np.any(normal):
         raise table.error("normal", normal.tolist(), "other than zero")
     width_m, height_m = table.lengths("size_m", 2)
-    return Rectangle.facing(centre_m, normal, size=(width_m, height_m)), None
+    plane = Rectangle.facing(centre_m, normal, size=(width_m, height_m))
+    return plane, 0.0 if kind == "glass" else None
 
 
 def _mesh(table: Table, folder: Path | None) -> tuple[Mesh, float | None]:
@@ -381,6 +389,22 @@ def _gloss(table: Table) -> tuple[float, float]:
         table.number("gloss", 0.0, least=0, most=1),
         table.number("gloss_exponent", 50.0, least=1, most=10_000),
     )
+
+
+def _glass(table: Table, *, dust: float) -> Glass:
+    return Glass(
+        table.number("refractive_index", 1.5, least=1, most=4),
+        table.number("thickness_m", 0.004, least=0, most=1),
+        table.number("reflectivity", least=0, most=1) if "reflectivity" in table else None,
+        dust,
+    )
+
+
+def _dust(pane: Surface) -> Iterator[Surface]:
+    """Make what scatters on the front and back of a pane."""
+    if pane.glass and pane.glass.dust:
+        for side in (pane.mirror, pane.mirror.turned()):
+            yield Surface("dust", "dust", side, pane.glass.dust)
 
 
 def _scatter(table: Table) -> Scatter:

@@ -92,6 +92,10 @@ class Rectangle:
         """Return it moved."""
         return replace(self, centre=self.centre + by)
 
+    def turned(self) -> "Rectangle":
+        """Return it with its front where its back is."""
+        return replace(self, normal=-self.normal, right=-self.right)
+
     def normals(self, points: Points) -> Points:
         """Return unit normals at points on it."""
         return np.broadcast_to(self.normal, points.shape)

@@ -50,8 +50,8 @@ def patches_of(scene: Scene, per_side: int) -> int:
 
 
 def mirror_paths_of(scene: Scene) -> int:
-    """Return how many chains of mirrors light may take: none goes from one to itself."""
-    mirrors = sum(each.kind == "mirror" for each in scene.surfaces)
+    """Return how many chains of mirrors and sides of panes there are: none from one to itself."""
+    mirrors = len(scene.mirrors)
     bounces = range(1, scene.mirror_bounces + 1)
     return sum(mirrors * (mirrors - 1) ** (each - 1) for each in bounces)
 

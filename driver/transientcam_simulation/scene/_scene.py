@@ -20,7 +20,7 @@ from transientcam_simulation.scene._motion import Motion
 Background = Literal["none", "median"]
 TimeZero = Literal["start", "peak"]
 Shape = Primitive | Mesh
-Kind = Literal["diffuse", "translucent", "mirror", "stencil"]
+Kind = Literal["diffuse", "translucent", "mirror", "stencil", "glass", "dust"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +74,42 @@ class Light:
     beam_exponent: float
 
 
+@dataclass(frozen=True, slots=True)
+class Glass:
+    """What makes a pane, clear from both sides, both faces of which count as one plane.
+
+    ``reflectivity`` is that of a half mirror at any angle; None: of bare faces, by Fresnel.
+    ``dust`` covers that share of it on both sides, and is white. Light is unpolarised, and what
+    goes to and fro between the faces adds up without interference.
+    """
+
+    refractive_index: float = 1.5
+    thickness_m: float = 0.004
+    reflectivity: float | None = None
+    dust: float = 0.0
+
+    def shares(self, cosine: Points) -> tuple[Points, Points, Points]:
+        """Shares that are mirrored and pass, by cosines of incidence, and m that these are late."""
+        n = self.refractive_index
+        within = np.sqrt(np.maximum(1 - (1 - cosine**2) / n**2, 1e-9))  # by Snell
+        across = ((cosine - n * within) / (cosine + n * within)) ** 2  # of one face, by Fresnel
+        along = ((n * cosine - within) / (n * cosine + within)) ** 2
+        mirrored = across / (1 + across) + along / (1 + along)
+        if self.reflectivity is not None:
+            mirrored = np.full(cosine.shape, self.reflectivity)
+        clean, later_m = 1 - self.dust, self.thickness_m * (n * within - cosine)
+        return clean * mirrored, clean * (1 - mirrored), later_m
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """Something that scatters, reflects or blocks light.
+    """Something that scatters, reflects, blocks or lets through light.
 
-    ``reflectivity`` is the albedo of a diffuse or translucent surface. ``opaque`` is the mask of
-    a stencil, rows from top to bottom as seen from its front; the other kinds have none. ``gloss``
-    is the share of light that a scattering surface reflects as a dull mirror, in a lobe of Blinn's
-    model with the exponent ``gloss_exponent``.
+    ``reflectivity`` is the albedo of a diffuse or translucent surface. A pane has a ``glass``;
+    its dust follows it, if it has any, as a surface of its front and one of its back. ``opaque`` is
+    the mask of a stencil, rows from top to bottom as seen from its front; the other kinds have
+    none. ``gloss`` is the share of light that a scattering surface reflects as a dull mirror, in a
+    lobe of Blinn's model with the exponent ``gloss_exponent``.
     """
 
     name: str
@@ -93,10 +121,11 @@ class Surface:
     motions: tuple[Motion, ...] = ()
     gloss: float = 0.0
     gloss_exponent: float = 50.0
+    glass: Glass | None = None
 
     @property
     def mirror(self) -> Rectangle:
-        """The plane of a mirror or stencil."""
+        """The plane of a mirror, stencil or pane."""
         assert isinstance(self.shape, Rectangle)  # noqa: S101  (scene files make no others)
         return self.shape
 
@@ -109,7 +138,12 @@ class Surface:
     @property
     def scatters(self) -> bool:
         """Whether light that falls on it goes in all directions."""
-        return self.kind in ("diffuse", "translucent")
+        return self.kind in ("diffuse", "translucent", "dust")
+
+    @property
+    def passes(self) -> bool:
+        """Whether light goes on behind it."""
+        return self.kind in ("glass", "dust")
 
     def offset_m(self, time_s: float) -> Points:
         """Return how far it has moved at a time."""
@@ -186,6 +220,18 @@ class Scene:
     def mirror_bounces(self) -> int:
         """Mirrors that light may pass."""
         return self.transport.mirror_bounces
+
+    @property
+    def panes(self) -> tuple[tuple[Rectangle, Glass], ...]:
+        """What lets light through, and where."""
+        return tuple((each.mirror, each.glass) for each in self.surfaces if each.glass)
+
+    @property
+    def mirrors(self) -> tuple[Surface, ...]:
+        """What mirrors light from its front: sides of a pane, which share their centre, as two."""
+        fronts = [each for each in self.surfaces if each.kind in ("mirror", "glass")]
+        backs = (replace(each, shape=each.mirror.turned()) for each in fronts if each.glass)
+        return (*fronts, *backs)
 
     @property
     def moves(self) -> bool:

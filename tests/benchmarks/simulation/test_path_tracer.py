@@ -100,6 +100,35 @@ def test_a_mirror_shows_what_stands_at_the_image(looks: str) -> None:
     require(found, expected, within=1e-4)
 
 
+def test_a_pane_shows_its_dust_and_what_is_behind_it() -> None:
+    """Straight on, lamp and camera in one place; of n = 1.5 two faces leave 12 / 13."""
+    more = 'kind = "glass"\nalbedo = 0.1\nthickness_m = 0.01'
+    pane = plate("[0, 1, 0]", "[0, 1, 0]", "[1, 1]", more)
+    found = moments(
+        WALL + pane, 2048, lamp="[0, 0, 0]", transport="diffuse_bounces = 0\nmirror_bounces = 1"
+    )
+
+    dust, wall = turned(0.1, 2), turned((0.9 * 12 / 13) ** 2 * 0.6 / 4, 4 + 2 * 0.005)
+    require(found, [a + b for a, b in zip(dust, wall, strict=True)], within=0.01)
+
+
+def test_a_half_mirror_parts_the_light_of_lamp_and_camera() -> None:
+    """Aslant at 45 degrees: over it the board beside, twice with a lamp beside the camera."""
+    more = 'kind = "glass"\nreflectivity = 0.3\nthickness_m = 0'
+    pane = plate("[0, 1, 0]", "[-1, -1, 0]", "[1, 1]", more)
+    board = plate("[-1.5, 1, 0]", "[1, 0, 0]", "[0.5, 0.5]")
+    place = {"lamp": "[0, 0, 0]", "transport": "diffuse_bounces = 0\nmirror_bounces = 1"}
+    found = moments(WALL + pane + board, 4096, **place)
+
+    straight, over = math.hypot(1.5, 1), 2.5
+    returns = [
+        turned(0.7**2 * 0.6 / 4, 4),
+        turned(0.3 * 0.6 * 1.5 / straight**3, 2.5 + straight),
+        turned(0.3**2 * 0.6 / over**2, 2.5 + over),
+    ]
+    require(found, [sum(each) for each in zip(*returns, strict=True)], within=0.01)
+
+
 def test_a_far_lamps_light_over_a_plate_is_its_form_factor() -> None:
     """A plate in even light above a small one: F of a point to a parallel rectangle (Lambert)."""
     small = plate("[0, 0, 0]", "[0, 0, 1]", "[0.02, 0.02]")

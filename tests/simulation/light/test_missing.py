@@ -50,6 +50,7 @@ def room(floor: str, *, transport: str = "") -> Scene:
 MIRROR = 'kind = "mirror"\nreflectivity = 0.5'
 GLOSSY = 'kind = "diffuse"\nalbedo = 0.0\ngloss = 0.4\ngloss_exponent = 200'
 MATT = 'kind = "diffuse"\nalbedo = 0.5'
+PANE = 'kind = "glass"\nalbedo = 0.3\nreflectivity = 0.6'
 
 
 def sampled(scene: Scene, *, moves: bool = False) -> SampledWays:
@@ -109,7 +110,7 @@ def test_light_between_a_mesh_and_a_wall_has_the_size_that_a_path_tracer_finds_o
     assert not sampled(walls).change("between-meshes", FREQUENCIES_HZ).any()
 
 
-@pytest.mark.parametrize("floor", [MATT, MIRROR])
+@pytest.mark.parametrize("floor", [MATT, MIRROR, PANE])
 def test_light_that_radiosity_follows_is_not_missing(floor: str) -> None:
     scene = room(floor)
     ways = sampled(scene)

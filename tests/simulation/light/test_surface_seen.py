@@ -82,7 +82,8 @@ def cast(text: str) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     right = unit(np.cross(ahead, (0.0, 0.0, 1.0)))
     upwards = np.cross(right, ahead)
     slope = math.tan(math.radians(camera["field_of_view_deg"] / 2)) / (WIDTH / 2)
-    surfaces = [each for each in scene["surface"] if each["kind"] != "stencil"]
+    # panes are an effect, and are not there without it
+    surfaces = [each for each in scene["surface"] if each["kind"] not in ("stencil", "glass")]
     range_m = np.full((HEIGHT, WIDTH), np.nan)
     lit, mirrors = np.zeros((2, HEIGHT, WIDTH), dtype=bool)
     for row in range(HEIGHT):

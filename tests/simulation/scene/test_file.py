@@ -56,12 +56,32 @@ mask = '''
     assert mask.tolist() == [[True, False, False], [False, True, True]]
 
 
+MOVED = """
+motion = "to"
+[[motion]]
+name = "to"
+path_m = [[0, 0, 0], [1, 0, 0]]
+period_s = 2
+[[surface]]
+kind = "glass"
+centre_m = [0, 1, 0]
+normal = [0, -1, 0]
+size_m = [1, 1]
+"""
+
 ERRORS = [
     ("albedo = 0.5", "albedo = 1.5", "surface[0].albedo", 1.5, "at most 1"),
     ("albedo = 0.5", "", "surface[0].albedo", None, "present"),
     ("albedo = 0.5", "albedo = true", "surface[0].albedo", True, "a number"),
     ("albedo = 0.5", "albedo = 0.5\nshiny = 1", "surface[0].shiny", 1, "known here are"),
-    ('"diffuse"', '"glass"', "surface[0].kind", "glass", "diffuse, translucent, mirror, stencil"),
+    ('"diffuse"', '"fog"', "surface[0].kind", "fog", "translucent, mirror, stencil, glass"),
+    ('"diffuse"', '"glass"\nthickness_m = -1', "surface[0].thickness_m", -1, "of at least 0"),
+    ('"diffuse"', '"glass"\nrefractive_index = 0.5', "surface[0].refractive_index", 0.5, "1 and"),
+    ('"diffuse"', '"glass"\nreflectivity = 2', "surface[0].reflectivity", 2, "of at most 1"),
+    ('"diffuse"', '"glass"\nshape = "sphere"', "surface[0].shape", "sphere", "of rectangle"),
+    ('"diffuse"', '"glass"\ngloss = 0.1', "surface[0].gloss", 0.1, "known here are"),
+    ('"diffuse"', '"glass"\nmotion = "to"', "surface[0].motion", ["to"], "a glass stays"),
+    ("albedo = 0.5", "albedo = 0.5" + MOVED, "surface[1].kind", "glass", "something moves"),
     ("[0, -1, 0]", "[0, 0, 0]", "surface[0].normal", [0, 0, 0], "other than zero"),
     ("[0, -1, 0]", "[0, -1]", "surface[0].normal", [0, -1], "a list of 3 numbers"),
     ("[0, -1, 0]", "[0, nan, 0]", "surface[0].normal", None, "a list of 3 numbers"),
@@ -135,6 +155,7 @@ def test_the_built_in_scenes_are_listed_with_a_sentence_each() -> None:
         "hall",
         "measured",
         "mirrors",
+        "pane",
         "translucent",
         "visitor",
         "wall",
