@@ -268,7 +268,7 @@ class World:
             phasors = {k: complex(np.exp(1j * k * turn_rad)) * out_of_step for k, *_ in light.terms}
             seen.append(light.at(phasors, illumination=label.illumination))
         plan.time_s = time_s + 0.5 * plan.sequence.exposure_s
-        return seen[0] if len(seen) == 1 else np.mean(seen, axis=0, dtype=np.float32)
+        return seen[0] if len(seen) == 1 else np.array(seen).mean(axis=0)
 
     def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> Quadratures:
         """Planes of the images of a harmonic; computed again only where the scene moves."""

@@ -261,7 +261,7 @@ class SceneFacts:
     def _pixel_rad(self) -> float:
         return math.radians(self._camera.field_of_view_deg) / self._size[0]
 
-    @cached_property
+    @property
     def pixels_per_s(self) -> float:
         """Highest speed of any surface, at the place where it stands, in pixels."""
         speeds = [0.0]
