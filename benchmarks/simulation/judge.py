@@ -57,23 +57,30 @@ class Told(NamedTuple):
     pixel: NDArray[np.intp]
     frequencies_hz: Values
     light_at: Callable[[float], NDArray[np.complex128]]
+    size: tuple[int, int]
 
 
 def told(
-    scene: Scene, sequences: tuple[str, ...], *, pixels: int, paths: int, as_stated: bool = True
+    scene: Scene,
+    sequences: tuple[str, ...],
+    *,
+    pixels: int,
+    paths: int,
+    as_stated: bool = True,
+    size: tuple[int, int] = SIZE,
 ) -> Told:
     """Have pixels drawn at random traced, when they are asked for, for all these sequences."""
     labels = (label for each in sequences for label in SEQUENCES[each].labels)
     frequencies = np.array(sorted({0.0, *(label.frequency_hz for label in labels)}))
-    pixel = np.random.default_rng(1).choice(SIZE[0] * SIZE[1], pixels, replace=False)
+    pixel = np.random.default_rng(1).choice(size[0] * size[1], pixels, replace=False)
     pixel.sort()
 
     @lru_cache(maxsize=1)
     def light_at(time_s: float) -> NDArray[np.complex128]:
-        tracer = Tracer(scene, SIZE, time_s=time_s, as_stated=as_stated)
+        tracer = Tracer(scene, size, time_s=time_s, as_stated=as_stated)
         return tracer.moments(pixel, frequencies, paths=paths)
 
-    return Told(pixel, frequencies, light_at)
+    return Told(pixel, frequencies, light_at, size)
 
 
 def judge(scene: Scene, sequence_name: str, by: Told) -> Verdict:
@@ -81,7 +88,7 @@ def judge(scene: Scene, sequence_name: str, by: Told) -> Verdict:
     sequence = SEQUENCES[sequence_name]
     of_light = [each.name for each in EFFECTS if issubclass(each, LightEffect)]
     others = {each.name: "off" for each in EFFECTS if each.optional and each.name not in of_light}
-    world = world_before(scene, others, sequence)
+    world = world_before(scene, others, sequence, by.size)
     period_s = sequence.exposure_s + READOUT_S
     scale_e = scene.light.electrons_per_s * sequence.exposure_s
     gain = world.conditions(sequence).sub_phase_gain(1)
@@ -92,7 +99,7 @@ def judge(scene: Scene, sequence_name: str, by: Told) -> Verdict:
 
     def traced(label: ImageLabel, time_s: float) -> Values:
         """Electrons of an image by the tracer, in each of its repetitions."""
-        light = by.light_at(time_s if scene.moves else 0.0)
+        light = by.light_at(time_s + sequence.exposure_s / 2 if scene.moves else 0.0)
         moment = light[:, list(by.frequencies_hz).index(label.frequency_hz)]
         turned = moment * gain * np.exp(-1j * label.phase_rad)
         electrons: Values = scale_e / 2 * (light[:, 0] + turned).real

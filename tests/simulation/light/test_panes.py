@@ -236,11 +236,8 @@ def test_the_built_in_pane_is_what_a_path_tracer_finds() -> None:
 
 
 @pytest.mark.parametrize("transport", ["diffuse_bounces = 0", "diffuse_bounces = 1\npatches = 16"])
-def test_panes_over_and_behind_each_other_are_what_a_path_tracer_finds(
-    transport: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_panes_over_and_behind_each_other_are_what_a_path_tracer_finds(transport: str) -> None:
     """Two panes aslant and a mirror, all of which see each other, a board, a wall, and shadows."""
-    monkeypatch.setattr("benchmarks.simulation.judge.SIZE", (57, 43))
     more = "albedo = 0.05\nthickness_m = 0.02"
     of = scene(
         WALL,
@@ -251,7 +248,7 @@ def test_panes_over_and_behind_each_other_are_what_a_path_tracer_finds(
         lamp="[0.3, 0, 0.1]",
         transport=transport,
     )
-    verdict = judge(of, "video", told(of, ("video",), pixels=24, paths=1024))
+    verdict = judge(of, "video", told(of, ("video",), pixels=24, paths=1024, size=(57, 43)))
 
     assert verdict.beyond_half == 0
     assert verdict.error < 0.2
