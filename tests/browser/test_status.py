@@ -5,7 +5,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import MIRRORS, SlowClock, Watch
+from tests.browser.conftest import MIRRORS, SlowClock, Watch, put
 from tests.browser.dashboard import LIVE, open_page, text
 from tests.serving import Served, serving
 
@@ -143,6 +143,21 @@ def test_the_sequence_is_judged_as_it_is_typed_and_set(
     page.wait_for_function(
         "() => transientcam.store.frames.of('coefficients').value?.coefficients?.harmonics === 4"
     )
+
+
+def test_one_click_shortens_the_exposure_until_hardly_a_pixel_is_saturated(
+    page: Page, served: Served
+) -> None:
+    open_page(page)
+    put(served, "sequence", {"harmonics": 4, "zeroth": "estimated", "exposure_s": 0.05})
+    page.locator("[data-field=exposure] button").click()
+    page.wait_for_function(
+        """() => {
+          const { pixels, exposure_s } = transientcam.store.status.newest.peek();
+          return exposure_s < 0.005 && pixels !== null && pixels.saturated <= 0.01 * pixels.total;
+        }"""
+    )
+    expect(page.locator("[data-field=exposure]")).to_have_count(0)
 
 
 def test_a_sequence_that_another_client_sets_is_shown(page: Page, served: Served) -> None:

@@ -54,6 +54,12 @@ describe("a frame with too much or too little light", () => {
     expect([advice(300), advice(40, 1), advice(40, 18, 0.05)]).toEqual([null, null, null]);
   });
 
+  test("is saturated by few pixels, too, while an exposure is being mended", () => {
+    expect(exposureAdvice(frame(2, 0), CAMERA)).toBeNull();
+    expect(exposureAdvice(frame(2, 0), CAMERA, Infinity, true)).toMatchObject({ word: "Saturated" });
+    expect(exposureAdvice(frame(0, 2), CAMERA, Infinity, true)).toBeNull();
+  });
+
   test("is named where no exposure mends it, and one with enough light is not", () => {
     expect(exposureAdvice(frame(100, 0, 2e-5), CAMERA)).toMatchObject({ word: "Saturated", exposure_s: null });
     for (const meta of [frame(9, 0), frame(0, 49), { exposure_s: 1, pixels: null } as FrameMeta, null])

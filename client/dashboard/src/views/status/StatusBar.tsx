@@ -1,5 +1,5 @@
 import { useComputed } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { engineering, fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
@@ -135,9 +135,24 @@ const DRIFTED = 0.1;
 function Fault() {
   const { status, sequence, sequencing, camera, replay, rangeErrors, frames, alone } = useStore();
   const task = useTask();
+  /** Of what an exposure was changed by a click: it is changed on until that is over, or the other way round. */
+  const settling = useRef("");
   const [applied, shown] = [sequence.value, status.newest.value];
-  if (applied === null || shown === null || replay.active.value) return null;
   const capabilities = camera.value?.capabilities ?? {};
+  const advice = exposureAdvice(shown, capabilities, frames.of(frames.amplitude.value).value?.map?.high, settling.current !== "");
+  // What was changed already shows with the frames to come.
+  const changed = applied?.exposure_s !== shown?.exposure_s || applied?.base_frequency_hz !== shown?.base_frequency_hz;
+  const expose = async (to: typeof advice): Promise<void> => {
+    settling.current = "";
+    if (applied === null || !to || to.exposure_s === null) return;
+    await sequencing.set({ ...applied, exposure_s: to.exposure_s });
+    settling.current = to.word;
+  };
+  useEffect(() => {
+    if (settling.current === "" || changed || !shown?.pixels || task.busy.value !== null) return;
+    void task.run("Applying…", () => expose(advice?.word === settling.current ? advice : null));
+  }, [shown?.frame]);
+  if (applied === null || shown === null || replay.active.value) return null;
   const mend = (field: string, word: string, remedy: string, long: string, work: () => Promise<unknown>) => (
     <span data-field={field}>
       <Steer title={task.refusal.value ?? long} task={task} onClick={() => void task.run("Applying…", work)}>
@@ -148,13 +163,10 @@ function Fault() {
       </Steer>
     </span>
   );
-  const advice = exposureAdvice(shown, capabilities, frames.of(frames.amplitude.value).value?.map?.high);
-  // What was changed already shows with the frames to come.
-  const changed = applied.exposure_s !== shown.exposure_s || applied.base_frequency_hz !== shown.base_frequency_hz;
   if (advice !== null) {
     const { word, long, exposure_s } = advice;
     if (exposure_s === null || changed) return <Sign field="exposure" short={word} long={long} />;
-    return mend("exposure", word, `exposure ${engineering(exposure_s, "s", 2)}`, long, () => sequencing.set({ ...applied, exposure_s }));
+    return mend("exposure", word, `exposure ${engineering(exposure_s, "s", 2)}`, long, () => expose(advice));
   }
   const trust = rangeErrors.of("range_error").value?.meta.accuracy?.trust;
   if (trust != null && trust.drift > DRIFTED * Object.values(trust).reduce((sum, count) => sum + count)) {

@@ -15,19 +15,21 @@ export function tokenWords({ token, refused }: Credentials): string {
     : "The service requires a token. Its operator makes one with transientcam token create.";
 }
 
-/** Least share of saturated and of dark pixels that something is done about, and from where on much; where the bright ones have little of the full scale, too, fewer dark ones count. */
-const [SATURATED, DARK, MOST, FAINT, FAINT_SCALE] = [0.1, 0.5, 0.8, 0.02, 1 / 16];
+/** Least share of saturated and of dark pixels that something is done about, and from where on much; where the bright ones have little of the full scale, too, fewer dark ones count. Of saturated ones what may stay once something is done. */
+const [SATURATED, DARK, MOST, FAINT, FAINT_SCALE, LEFT] = [0.1, 0.5, 0.8, 0.02, 1 / 16, 0.01];
 
 /** What to do about a frame with too much or too little light: the exposure to try, null where the camera has none; null where there is enough. */
 export function exposureAdvice(
   meta: FrameMeta | null,
   { min_exposure_s: least_s = 0, max_exposure_s: most_s = Infinity, bits }: Readonly<Record<string, unknown>>,
   brightest_dn = Infinity,
+  begun = false,
 ): { readonly word: string; readonly long: string; readonly exposure_s: number | null } | null {
   if (!meta?.pixels) return null;
   const { pixels, exposure_s } = meta;
   const [bright, dark] = [pixels.saturated / pixels.total, pixels.no_signal / pixels.total];
-  const [word, share, why] = bright >= SATURATED ? ["Saturated", bright, "are saturated"] : ["Dark", dark, "get too little light"];
+  const [word, share, why] =
+    bright >= (begun ? LEFT : SATURATED) ? ["Saturated", bright, "are saturated"] : ["Dark", dark, "get too little light"];
   const faint = word === "Dark" && brightest_dn < FAINT_SCALE * 2 ** Number(bits) && exposure_s < Number(most_s);
   if (word === "Dark" && dark < (faint ? FAINT : DARK)) return null;
   const factor = (share >= MOST || faint ? 8 : 2) ** (word === "Dark" ? 1 : -1);
