@@ -149,12 +149,12 @@ def test_one_click_shortens_the_exposure_until_hardly_a_pixel_is_saturated(
     page: Page, served: Served
 ) -> None:
     open_page(page)
-    put(served, "sequence", {"harmonics": 4, "zeroth": "estimated", "exposure_s": 0.05})
+    put(served, "sequence", {"harmonics": 4, "zeroth": "estimated", "exposure_s": 8e-3})
     page.locator("[data-field=exposure] button").click()
     page.wait_for_function(
         """() => {
           const { pixels, exposure_s } = transientcam.store.status.newest.peek();
-          return exposure_s < 0.005 && pixels !== null && pixels.saturated <= 0.01 * pixels.total;
+          return exposure_s < 0.003 && pixels !== null && pixels.saturated <= 0.01 * pixels.total;
         }"""
     )
     expect(page.locator("[data-field=exposure]")).to_have_count(0)

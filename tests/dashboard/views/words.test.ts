@@ -36,7 +36,8 @@ describe("a frame with too much or too little light", () => {
     ({ exposure_s, pixels: { total: 100, saturated, no_signal } }) as FrameMeta;
 
   test.each([
-    [100, 0, "Saturated", 0.002],
+    [100, 0, "Saturated", 0.0005],
+    [85, 0, "Saturated", 0.002],
     [20, 0, "Saturated", 0.008],
     [20, 70, "Saturated", 0.008],
     [0, 60, "Dark", 0.032],

@@ -32,7 +32,9 @@ export function exposureAdvice(
     bright >= (begun ? LEFT : SATURATED) ? ["Saturated", bright, "are saturated"] : ["Dark", dark, "get too little light"];
   const faint = word === "Dark" && brightest_dn < FAINT_SCALE * 2 ** Number(bits) && exposure_s < Number(most_s);
   if (word === "Dark" && dark < (faint ? FAINT : DARK)) return null;
-  const factor = (share >= MOST || faint ? 8 : 2) ** (word === "Dark" ? 1 : -1);
+  // Where even the darkest are saturated, the brightest are so by far.
+  const much = word === "Saturated" && share >= 1 - LEFT ? 32 : 8;
+  const factor = (share >= MOST || faint ? much : 2) ** (word === "Dark" ? 1 : -1);
   const wanted_s = Math.min(Number(most_s), Math.max(Number(least_s), Number((factor * exposure_s).toPrecision(2))));
   const remedy =
     wanted_s === exposure_s ? "no exposure of this camera mends that" : `sets the exposure to ${engineering(wanted_s, "s", 2)}`;
