@@ -553,8 +553,9 @@ def test_an_image_of_what_moves_is_the_mean_over_its_exposure(speed_m_s: float) 
         ],
         axis=0,
     )
-    at = {"number": 2, "device_time_s": begun_s}
-    middle, blurred = (world(each).mean_image_e(label, **at) for each in ("off", "on"))  # type: ignore[arg-type]
+    middle, blurred = (
+        world(each).mean_image_e(label, number=2, device_time_s=begun_s) for each in ("off", "on")
+    )
     left, blurs = (np.abs(each - wanted).max() for each in (blurred, middle))
     assert left < 0.15 * blurs + 1e-3 * wanted.max()
 

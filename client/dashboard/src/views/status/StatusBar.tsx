@@ -135,22 +135,23 @@ const DRIFTED = 0.1;
 function Fault() {
   const { status, sequence, sequencing, camera, replay, rangeErrors, frames, alone } = useStore();
   const task = useTask();
-  /** Of what an exposure was changed by a click: it is changed on until that is over, or the other way round. */
-  const settling = useRef("");
+  /** Of what an exposure was changed by a click, and to which: it is changed on until that is over, the other way round, or somebody sets another. */
+  const settling = useRef<{ word: string; exposure_s: number } | null>(null);
   const [applied, shown] = [sequence.value, status.newest.value];
   const capabilities = camera.value?.capabilities ?? {};
-  const advice = exposureAdvice(shown, capabilities, frames.of(frames.amplitude.value).value?.map?.high, settling.current !== "");
+  const advice = exposureAdvice(shown, capabilities, frames.of(frames.amplitude.value).value?.map?.high, settling.current !== null);
   // What was changed already shows with the frames to come.
   const changed = applied?.exposure_s !== shown?.exposure_s || applied?.base_frequency_hz !== shown?.base_frequency_hz;
   const expose = async (to: typeof advice): Promise<void> => {
-    settling.current = "";
+    settling.current = null;
     if (applied === null || !to || to.exposure_s === null) return;
     await sequencing.set({ ...applied, exposure_s: to.exposure_s });
-    settling.current = to.word;
+    settling.current = { word: to.word, exposure_s: Number(sequence.peek()?.exposure_s) };
   };
   useEffect(() => {
-    if (settling.current === "" || changed || !shown?.pixels || task.busy.value !== null) return;
-    void task.run("Applying…", () => expose(advice?.word === settling.current ? advice : null));
+    if (settling.current === null || changed || !shown?.pixels || task.busy.value !== null) return;
+    const { word, exposure_s } = settling.current;
+    void task.run("Applying…", () => expose(advice?.word === word && applied?.exposure_s === exposure_s ? advice : null));
   }, [shown?.frame]);
   if (applied === null || shown === null || replay.active.value) return null;
   const mend = (field: string, word: string, remedy: string, long: string, work: () => Promise<unknown>) => (
