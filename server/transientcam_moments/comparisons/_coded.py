@@ -10,7 +10,7 @@ from transientcam_moments.arrays import Array, flat_planes, in_range
 from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._grid import cluster, stacked
 from transientcam_moments.comparisons._pixels import Complex, Pixels
-from transientcam_moments.comparisons._technique import Technique
+from transientcam_moments.comparisons._technique import TEXTS, Technique
 from transientcam_moments.errors import ParameterError, ShapeError
 
 BITS = 5
@@ -193,16 +193,9 @@ def _pixels(samples: Array) -> Pixels:
 
 
 TECHNIQUE = Technique(
-    name="coded",
-    label="after Kadambi et al. 2013 (coded modulation)",
-    returns="a few",
-    frequencies="f, modulated by a code of 31 chips, at 62 shifts or more",
+    **TEXTS["coded"],
     harmonics=lambda m: (1,),
     least_harmonics=1,
-    assumptions="Few sharp returns; the correlation of the code is known.",
-    cost="Dozens of images, and non-negative least squares for each pixel, milliseconds long.",
-    failure="Continuous light falls apart into returns; the code's bandwidth has to pass through "
-    "source and sensor.",
     estimate=coded,
     measures="code",
     planar=False,

@@ -7,7 +7,7 @@ import numpy as np
 from transientcam_moments.arrays import Array
 from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._pixels import Complex, pixels_of
-from transientcam_moments.comparisons._technique import Technique
+from transientcam_moments.comparisons._technique import TEXTS, Technique
 
 _LEAST = 2
 _STARTS = 24  # phases around the turn among which pairs are tried
@@ -82,16 +82,9 @@ def _starts(wanted: Real) -> Real:
 
 
 TECHNIQUE = Technique(
-    name="dorrington",
-    label="after Dorrington et al. 2011 (least squares)",
-    returns="2",
-    frequencies="f, 2 f",
+    **TEXTS["dorrington"],
     harmonics=lambda m: (1, 2),
     least_harmonics=_LEAST,
-    assumptions="At most two sharp returns.",
-    cost="An iterative fit for each pixel, milliseconds long.",
-    failure="Four numbers for four unknowns leave nothing against noise, nor any hint that there "
-    "were more returns; descents may end in a local minimum.",
     estimate=dorrington,
     planar=False,
 )

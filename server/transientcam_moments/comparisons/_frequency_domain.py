@@ -5,7 +5,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, by_blocks, in_range
 from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._pixels import Complex, pixels_of
-from transientcam_moments.comparisons._technique import Technique, from_first
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first
 from transientcam_moments.comparisons._weights import nonnegative_weights
 from transientcam_moments.errors import ParameterError
 
@@ -65,15 +65,8 @@ def _peaks(c: Complex, returns: int, threshold: float) -> Real:
 
 
 TECHNIQUE = Technique(
-    name="frequency-domain",
-    label="after Kadambi et al. 2015 (frequency-domain ToF)",
-    returns="2, or as many as are asked for",
-    frequencies="f .. m f, many",
+    **TEXTS["frequency-domain"],
     harmonics=from_first,
     least_harmonics=_LEAST,
-    assumptions="Returns farther apart than the window's main lobe, 8 pi / (m + 1).",
-    cost="A Fourier transform of 1024, and least squares with as many unknowns as returns.",
-    failure="Closer returns are one peak; the side lobes of a strong return hide a weak one. With "
-    "the handful of frequencies that the paper measures it resolves next to nothing.",
     estimate=frequency_domain,
 )

@@ -5,7 +5,7 @@ import numpy as np
 from transientcam_moments.arrays import Array
 from transientcam_moments.comparisons._estimate import SparseEstimate
 from transientcam_moments.comparisons._pixels import pixels_of
-from transientcam_moments.comparisons._technique import Technique
+from transientcam_moments.comparisons._technique import TEXTS, Technique
 
 _LEAST = 4
 
@@ -41,15 +41,5 @@ def godbaz(b: Array) -> SparseEstimate:
 
 
 TECHNIQUE = Technique(
-    name="godbaz",
-    label="after Godbaz et al. 2012",
-    returns="2",
-    frequencies="f, 2 f, 3 f, 4 f",
-    harmonics=lambda m: (1, 2, 3, 4),
-    least_harmonics=_LEAST,
-    assumptions="Exactly two sharp returns.",
-    cost="Closed form: a quadratic equation.",
-    failure="The formula divides by what vanishes as the returns merge or one of them fades, so "
-    "noise goes wild there; of more than two returns it captures the first or a blend.",
-    estimate=godbaz,
+    **TEXTS["godbaz"], harmonics=lambda m: (1, 2, 3, 4), least_harmonics=_LEAST, estimate=godbaz
 )

@@ -5,7 +5,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, chosen
 from transientcam_moments.comparisons._estimate import GRID_PHASES, GridEstimate, Real, grid_rad
 from transientcam_moments.comparisons._pixels import pixels_of
-from transientcam_moments.comparisons._technique import Technique, from_first
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first
 
 WINDOWS = ("hann", "none")
 CORRECTIONS = ("lift", "clip", "none")
@@ -60,15 +60,5 @@ def _corrected(series: Real, mean: Real, correction: str) -> Real:
 
 
 TECHNIQUE = Technique(
-    name="inverse-fourier",
-    label="after Lin et al. 2014 (inverse Fourier)",
-    returns="density",
-    frequencies="f .. m f",
-    harmonics=from_first,
-    least_harmonics=1,
-    assumptions="Light varies slowly: nothing beyond the highest frequency measured.",
-    cost="A matrix product: O(m) a phase.",
-    failure="A sharp return becomes a wave as wide as the period of the highest frequency, with "
-    "side lobes that look like returns; the original measures many frequencies for that.",
-    estimate=inverse_fourier,
+    **TEXTS["inverse-fourier"], harmonics=from_first, least_harmonics=1, estimate=inverse_fourier
 )

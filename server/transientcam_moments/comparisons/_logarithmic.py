@@ -7,7 +7,7 @@ from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._grid import cluster, stacked
 from transientcam_moments.comparisons._pixels import Complex, pixels_of
 from transientcam_moments.comparisons._sra import BINS, EPSILON, program
-from transientcam_moments.comparisons._technique import Technique, from_first
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first
 from transientcam_moments.errors import ParameterError
 
 STEPS = 4
@@ -64,16 +64,9 @@ def logarithmic(
 
 
 TECHNIQUE = Technique(
-    name="logarithmic",
-    label="after Qiao et al. 2015 (logarithmic prior)",
-    returns="2 m",
-    frequencies="f .. m f",
+    **TEXTS["logarithmic"],
     harmonics=from_first,
     least_harmonics=_LEAST,
-    assumptions="Few returns, whatever their strength.",
-    cost="Several linear programs for each pixel.",
-    failure="Not convex: it ends where its first step, the 1-norm, leads to; continuous light "
-    "becomes fewer and stronger returns still.",
     estimate=logarithmic,
     planar=False,
 )

@@ -5,7 +5,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, by_blocks, in_range
 from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._pixels import Complex, pixels_of
-from transientcam_moments.comparisons._technique import Technique, from_first
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first
 from transientcam_moments.comparisons._weights import nonnegative_weights
 from transientcam_moments.errors import ParameterError
 
@@ -65,15 +65,8 @@ def _pursue(c: Complex, returns: int, bins: int, tolerance: float) -> tuple[Real
 
 
 TECHNIQUE = Technique(
-    name="matching-pursuit",
-    label="after Bhandari et al. 2014b (orthogonal matching pursuit)",
-    returns="2, or as many as are asked for",
-    frequencies="f .. m f, many",
+    **TEXTS["matching-pursuit"],
     harmonics=from_first,
     least_harmonics=_LEAST,
-    assumptions="A few sharp returns, farther apart than 2 pi / m, on a grid.",
-    cost="A correlation with the grid and least squares for each return.",
-    failure="Returns that are closer are first taken for one between them, which no later step "
-    "takes back.",
     estimate=matching_pursuit,
 )

@@ -5,7 +5,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, by_blocks
 from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._pixels import Complex, pixels_of
-from transientcam_moments.comparisons._technique import Technique, from_first
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first
 from transientcam_moments.comparisons._weights import nonnegative_weights
 from transientcam_moments.errors import ParameterError
 
@@ -55,15 +55,5 @@ def _phases(c: Complex, count: int) -> Real:
 
 
 TECHNIQUE = Technique(
-    name="matrix-pencil",
-    label="after Bhandari et al. 2014a (matrix pencil)",
-    returns="(m - 1) // 2",
-    frequencies="f .. m f, m = 2 K + 1 for K returns",
-    harmonics=from_first,
-    least_harmonics=_LEAST,
-    assumptions="At most K sharp returns.",
-    cost="Closed form: a singular value decomposition and eigenvalues of matrices of about m / 2.",
-    failure="It needs twice as many frequencies as the paper for the same returns, finds no "
-    "response with all of the moments where there are more, and noise splits returns.",
-    estimate=matrix_pencil,
+    **TEXTS["matrix-pencil"], harmonics=from_first, least_harmonics=_LEAST, estimate=matrix_pencil
 )

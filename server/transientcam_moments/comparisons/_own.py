@@ -6,7 +6,7 @@ from transientcam_moments.comparisons._estimate import (
     MaximumEntropyEstimate,
     SparseEstimate,
 )
-from transientcam_moments.comparisons._technique import Technique, from_first, from_zeroth
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first, from_zeroth
 from transientcam_moments.likelihood import likelihood, merge_returns
 from transientcam_moments.moment_problem import levinson, pisarenko
 
@@ -46,56 +46,20 @@ def likelihood_estimate(b: Array) -> LikelihoodEstimate:
 
 
 MAXIMUM_ENTROPY = Technique(
-    name="maximum-entropy",
-    label="Peters et al. 2015, maximum entropy",
-    returns="density",
-    frequencies="0, f .. m f",
+    **TEXTS["maximum-entropy"],
     harmonics=from_zeroth,
     least_harmonics=1,
-    assumptions="A positive density; nothing else.",
-    cost="Closed form: O(m^2) once, O(m) a phase.",
-    failure="Peaks broaden and merge where m moments leave the response open; contradictory "
-    "moments have to be biased before.",
     estimate=maximum_entropy_estimate,
 )
 
 PISARENKO = Technique(
-    name="pisarenko",
-    label="Peters et al. 2015, Pisarenko",
-    returns="m",
-    frequencies="f .. m f; 0 for the uniform part",
-    harmonics=from_first,
-    least_harmonics=1,
-    assumptions="At most m sharp returns and a uniform part.",
-    cost="Closed form: a smallest eigenvalue and the roots of a polynomial of degree m.",
-    failure="A continuous response is made sparse: outliers in range under diffuse light.",
-    estimate=pisarenko_estimate,
+    **TEXTS["pisarenko"], harmonics=from_first, least_harmonics=1, estimate=pisarenko_estimate
 )
 
 MERGED = Technique(
-    name="pisarenko-merged",
-    label="Pisarenko, returns that noise split merged",
-    returns="m",
-    frequencies="0, f .. m f",
-    harmonics=from_zeroth,
-    least_harmonics=1,
-    assumptions="At most m sharp returns and a uniform part; the noise of the moments.",
-    cost="That of Pisarenko's, and up to m - 1 rounds over m pairs of returns.",
-    failure="Returns that are closer than noise can tell become one; a continuous response is made "
-    "sparse.",
-    estimate=merged_estimate,
+    **TEXTS["pisarenko-merged"], harmonics=from_zeroth, least_harmonics=1, estimate=merged_estimate
 )
 
 LIKELIHOOD = Technique(
-    name="likelihood",
-    label="Weighted least squares of few returns, or one with a tail",
-    returns="3, or 1 and a tail",
-    frequencies="f .. m f; 0 helps",
-    harmonics=from_zeroth,
-    least_harmonics=1,
-    assumptions="Few sharp returns, or one with a gamma-shaped tail; the noise of the moments.",
-    cost="Up to ten fits of 4 to 10 Levenberg-Marquardt steps, in compiled kernels.",
-    failure="Light of another shape biases the range; chi-square then says so where it exceeds "
-    "the noise.",
-    estimate=likelihood_estimate,
+    **TEXTS["likelihood"], harmonics=from_zeroth, least_harmonics=1, estimate=likelihood_estimate
 )

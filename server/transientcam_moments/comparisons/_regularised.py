@@ -7,7 +7,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, in_range
 from transientcam_moments.comparisons._estimate import GridEstimate, Real, grid_rad
 from transientcam_moments.comparisons._pixels import Pixels, pixels_of
-from transientcam_moments.comparisons._technique import Technique, from_first
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first
 from transientcam_moments.errors import ParameterError
 
 BINS = 64
@@ -138,16 +138,9 @@ def _neighbours(axes: int, axis: int) -> tuple[tuple[slice, ...], tuple[slice, .
 
 
 TECHNIQUE = Technique(
-    name="regularised",
-    label="after Heide et al. 2013 (temporal and spatial priors)",
-    returns="density",
-    frequencies="f .. m f, many in the original",
+    **TEXTS["regularised"],
     harmonics=from_first,
     least_harmonics=_LEAST,
-    assumptions="Light varies little over time and from pixel to pixel, with few edges.",
-    cost="An iterative solution for the whole image: seconds to minutes.",
-    failure="The priors smear what is sharp in time, weak returns into strong ones, and light "
-    "across edges of the scene.",
     estimate=regularised,
     planar=False,
 )

@@ -5,7 +5,7 @@ import numpy as np
 from transientcam_moments.arrays import Array
 from transientcam_moments.comparisons._estimate import SparseEstimate
 from transientcam_moments.comparisons._pixels import pixels_of
-from transientcam_moments.comparisons._technique import Technique
+from transientcam_moments.comparisons._technique import TEXTS, Technique
 
 
 def single_frequency(b: Array) -> SparseEstimate:
@@ -16,16 +16,9 @@ def single_frequency(b: Array) -> SparseEstimate:
 
 
 SINGLE_FREQUENCY = Technique(
-    name="single-frequency",
-    label="single frequency",
-    returns="1",
-    frequencies="f",
+    **TEXTS["single-frequency"],
     harmonics=lambda m: (1,),
     least_harmonics=1,
-    assumptions="All light takes the same way.",
-    cost="One arctangent.",
-    failure="Light on other ways pulls the phase towards itself: the range is too long under "
-    "indirect light, and nothing says so.",
     estimate=single_frequency,
 )
 
@@ -49,15 +42,8 @@ def high_frequency(b: Array) -> SparseEstimate:
 
 
 HIGH_FREQUENCY = Technique(
-    name="high-frequency",
-    label="after Gupta et al. 2015 (high-frequency phase)",
-    returns="1",
-    frequencies="(m - 1) f, m f",
+    **TEXTS["high-frequency"],
     harmonics=lambda m: (m - 1, m),
     least_harmonics=_LEAST,
-    assumptions="Indirect light is smooth over time, so that it has nothing at these frequencies.",
-    cost="Two arctangents.",
-    failure="A mirror's return does not cancel: it pulls the phase by up to its share, and where "
-    "it is strong the wrong period is chosen.",
     estimate=high_frequency,
 )

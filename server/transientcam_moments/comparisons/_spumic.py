@@ -5,7 +5,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, by_blocks
 from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._pixels import Complex, pixels_of
-from transientcam_moments.comparisons._technique import Technique
+from transientcam_moments.comparisons._technique import TEXTS, Technique
 from transientcam_moments.comparisons._weights import nonnegative_weights
 
 _LEAST = 6
@@ -42,16 +42,8 @@ def _phases(c: Complex) -> Real:
 
 
 TECHNIQUE = Technique(
-    name="spumic",
-    label="after Kirmani et al. 2013 (SPUMIC)",
-    returns="2",
-    frequencies="f, 2 f .. 6 f",
+    **TEXTS["spumic"],
     harmonics=lambda m: tuple(range(1, _LEAST + 1)),
     least_harmonics=_LEAST,
-    assumptions="At most two sharp returns.",
-    cost="A singular value decomposition of 8 x 3, a quadratic equation, least squares with two "
-    "unknowns.",
-    failure="A third return or a continuous response has no such filter: it captures the first "
-    "return and one phase for all the rest, and is sensitive to noise.",
     estimate=spumic,
 )

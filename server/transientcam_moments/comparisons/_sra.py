@@ -10,7 +10,7 @@ from transientcam_moments.arrays import Array, in_range, moment_planes
 from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._grid import cluster, stacked
 from transientcam_moments.comparisons._pixels import Complex, Pixels, pixels_of
-from transientcam_moments.comparisons._technique import Technique, from_first
+from transientcam_moments.comparisons._technique import TEXTS, Technique, from_first
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.likelihood import places_of
 from transientcam_moments.moment_problem import pisarenko
@@ -113,16 +113,5 @@ def program(multiples: Sequence[int], *, bins: int, epsilon: float) -> Callable[
 
 
 TECHNIQUE = Technique(
-    name="sra",
-    label="after Freedman et al. 2014 (SRA)",
-    returns="2 m",
-    frequencies="f .. m f, three in the original",
-    harmonics=from_first,
-    least_harmonics=_LEAST,
-    assumptions="The least light that explains the measurement up to a tolerance is the truth.",
-    cost="A linear program for each pixel, milliseconds long; closed form at epsilon = 0.",
-    failure="Biased towards fewer returns and less light: a weak third return is lost within the "
-    "tolerance, which in turn takes up noise.",
-    estimate=sra,
-    planar=False,
+    **TEXTS["sra"], harmonics=from_first, least_harmonics=_LEAST, estimate=sra, planar=False
 )

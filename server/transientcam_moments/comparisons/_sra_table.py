@@ -12,7 +12,7 @@ from transientcam_moments.comparisons._estimate import Real, SparseEstimate
 from transientcam_moments.comparisons._grid import cluster
 from transientcam_moments.comparisons._pixels import Complex, pixels_of
 from transientcam_moments.comparisons._sra import EPSILON, program
-from transientcam_moments.comparisons._technique import Technique
+from transientcam_moments.comparisons._technique import TEXTS, Technique
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD
 
@@ -114,15 +114,5 @@ def _first(light: Real | None) -> complex:
 
 
 TECHNIQUE = Technique(
-    name="sra-table",
-    label="after Freedman et al. 2014 (SRA, look-up table)",
-    returns="1, the first",
-    frequencies="f, 2 f, 3 f",
-    harmonics=lambda m: (1, 2, 3),
-    least_harmonics=_LEAST,
-    assumptions="As of sra; the first return is within half a turn of the single frequency's.",
-    cost="A table of seconds to build once; then an interpolation in four dimensions.",
-    failure="As of sra, and coarser than the table's cells wherever the first return appears or "
-    "fades between two nodes.",
-    estimate=sra_table,
+    **TEXTS["sra-table"], harmonics=lambda m: (1, 2, 3), least_harmonics=_LEAST, estimate=sra_table
 )

@@ -1,12 +1,20 @@
 """What every technique says of itself, so that one can be exchanged for another."""
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Final, Literal
 
 from transientcam_moments.arrays import Array
 from transientcam_moments.comparisons._estimate import Estimate
 from transientcam_moments.noise import MomentNoise
+
+_WORDS: Final = tomllib.loads(Path(__file__).with_name("techniques.toml").read_text("utf-8"))
+TEXTS: Final[dict[str, dict[str, Any]]] = {
+    name: {"name": name, **texts} for name, texts in _WORDS.items()
+}
+"""What each of ours says in words, by its name: the arguments of `Technique` that are texts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

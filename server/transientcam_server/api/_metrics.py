@@ -4,7 +4,9 @@ What the service counts anyway is read at each scrape; only distributions are ob
 they happen. Each service has a registry of its own.
 """
 
+import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, Final
 
 import prometheus_client as prometheus
@@ -104,49 +106,7 @@ class Metrics:
         return prometheus.generate_latest(self.registry)
 
 
-_SERIES: Final = """\
-gauge | device_connected | | Whether the camera answers.
-gauge | acquisition_running | | Whether frames are being captured.
-counter | device_losses | | How often the camera was lost.
-counter | device_reconnects | | How often a lost camera came back.
-counter | images | result | Images from the camera, by what became of them.
-counter | spoilt_images | result | Images unlike the others, of frames that were computed, by what \
-became of them.
-counter | usb_resynchronisations | | How often the beginning of an image had to be searched for.
-counter | frames_captured | | Frames since the service started.
-gauge | frame_age_seconds | | Since the last frame arrived.
-counter | device_results | device | Passes and likelihoods that a GPU was asked for, by what \
-computed them.
-gauge | sensor_temperature_celsius | | Of the camera, with its last frame.
-gauge | pixels_flagged_ratio | flag | Share of the pixels of the last frame that was looked at \
-that carry a flag.
-gauge | history_frames | | Former frames that can still be had.
-gauge | history_bytes | | Memory of their raw images.
-gauge | history_limit_bytes | | What it may be at most.
-gauge | calibration_active | | Whether a measurement calibrates frames, where it fits the sequence.
-gauge | calibration_timestamp_seconds | | When the active calibration was measured.
-gauge | calibration_invalid_pixels_ratio | | Share of pixels whose moments contradict each other \
-by more than noise explains.
-gauge | stream_clients | | Streams open now.
-gauge | preview_clients | | Clients that receive a preview as MJPEG now.
-counter | frames_dropped | | Frames that clients were too slow for, of all clients together.
-gauge | lease_held | | Whether a client holds the lease.
-gauge | recording_active | | Whether frames are being recorded.
-counter | recording_frames | | Frames that were recorded.
-counter | recording_dropped_frames | | Frames that the disk was too slow for.
-counter | recording_bytes | | Bytes that were written.
-counter | recordings_ended | reason | Recordings, by why they ended.
-gauge | disk_waiting_seconds | | How long the disk of the recordings has not answered.
-gauge | recording_disk_free_bytes | | What the disk has left where recordings are kept.
-counter | relay_reconnects | | How often the origin was found again.
-counter | relay_origin_restarts | | How often the origin was started anew meanwhile.
-counter | relay_dropped_frames | | Frames that the origin dropped because relay or network were \
-too slow.
-gauge | relay_hop_latency_seconds | hop | From the arrival of the last frame at the service before \
-to that at the relay, by both clocks; hop 1 is the nearest to the camera.
-counter | relay_hop_missed_frames | hop | Frames that a relay never got of the service before it.
-"""
-"""A line a series: what it does, its name, the label of its values, what it means."""
+_SERIES: Final = tomllib.loads(Path(__file__).with_name("metrics.toml").read_text("utf-8"))
 
 
 class _ServiceCollector(Collector):
@@ -163,10 +123,10 @@ class _ServiceCollector(Collector):
         versions |= {"model": capabilities.model, "firmware": capabilities.firmware}
         yield InfoMetricFamily("transientcam_build", "Versions of what runs here.", value=versions)
         values = self._of_camera() | self._of_frames() | self._of_clients() | self._of_relay()
-        for line in _SERIES.splitlines():
-            kind, name, label, meaning = (each.strip() for each in line.split("|"))
+        for name, series in _SERIES.items():
             if (value := values.get(name)) is not None:
-                yield _filled(_FAMILIES[kind], f"transientcam_{name}", meaning, value, label)
+                family, told = _FAMILIES[series["kind"]], (series["meaning"], value)
+                yield _filled(family, f"transientcam_{name}", *told, series.get("label", ""))
 
     def _of_camera(self) -> "_Values":
         status, counters = self._service.acquisition.status(), self._service.camera.counters

@@ -217,10 +217,7 @@ def _encoding_fields() -> dict[str, _Schema]:
 
 
 def _notice(kind: wire.NoticeKind) -> _Schema:
-    keys = {
-        name: {"type": types if isinstance(types, str) else list(types)}
-        for name, types in kind.keys.items()
-    }
+    keys = {name: {"type": types} for name, types in kind.keys.items()}
     required = [name for name in keys if name not in kind.optional]
     schema = _map(
         {"type": _constant("notice"), "kind": _constant(kind.name), **keys},
