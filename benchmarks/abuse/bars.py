@@ -1,13 +1,10 @@
 """What healthy clients have under each attack, and whether that reaches the bars."""
 
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final
 
 from benchmarks.abuse.attacks import ATTACKS
 from benchmarks.abuse.measuring import COMES_BACK_S, GIVE_UP_S, AttackOutcome, measure
-from benchmarks.common.machine import commit_of
 from benchmarks.common.tables import Cell, Table, heads
 
 _MIB = 2**20
@@ -51,9 +48,16 @@ def tables(
     The simulated camera is at the paper's video setting. Meanwhile a viewer streams range, /livez
     is asked, a lease lapses, the light is switched off, and SIGTERM ends it.
     """
-    table = _table(attacks, connections, seconds, None)
-    table.text.append(f"Each attack goes on for {seconds:g} s and longer.")
-    table.notes.extend(
+    if unknown := set(attacks) - set(ATTACKS):
+        raise SystemExit(f"unknown attacks {unknown}, choose from {', '.join(ATTACKS)}")
+    yield Table(
+        "",
+        _COLUMNS,
+        [
+            _row(name, count, measure(name, count, duration_s=seconds))
+            for name in attacks
+            for count in connections
+        ],
         [
             "- frames: of one viewer of range, over those without an attack; bar "
             f"{FRAMES_BAR:.0%}. With TLS, frames captured.",
@@ -68,41 +72,14 @@ def tables(
             f"{GROWN_BAR_BYTES // _MIB} MiB.",
             f"- SIGTERM: until the daemon has ended, under attack; bar {END_BAR_S:g} s.",
             f"- never: not within {GIVE_UP_S:g} s.",
-        ]
+        ],
+        [f"Each attack goes on for {seconds:g} s and longer."],
     )
-    yield table
-
-
-def before(
-    *, checkout: Path, attacks: tuple[str, ...] = tuple(ATTACKS), seconds: float = 5.0
-) -> Iterator[Table]:
-    """Attack the daemon of another checkout in the same ways, from one connection."""
-    load, _, _ = os.getloadavg()
-    table = _table(attacks, (1,), seconds, checkout)
-    table.text.append(
-        f"The daemon of commit {commit_of(checkout)}, an older one, under the same attacks. Other "
-        f"programs ran meanwhile: the load average before the first attack was {load:.1f}."
-    )
-    yield table
-
-
-def _table(
-    attacks: tuple[str, ...], connections: tuple[int, ...], seconds: float, checkout: Path | None
-) -> Table:
-    table = Table("Before" if checkout else "", _COLUMNS)
-    for name in attacks:
-        if name not in ATTACKS:
-            raise SystemExit(f"unknown attack {name!r}, choose from {', '.join(ATTACKS)}")
-        for count in connections:
-            seen = measure(name, count, duration_s=seconds, checkout=checkout)
-            table.rows.append(_row(name, count, seen))
-            print(*table.rows[-1], flush=True)
-    return table
 
 
 def _row(name: str, connections: int, seen: AttackOutcome) -> tuple[Cell, ...]:
     below = missed(seen)
-    return (
+    row: tuple[Cell, ...] = (
         name,
         connections,
         seen.frames,
@@ -113,6 +90,8 @@ def _row(name: str, connections: int, seen: AttackOutcome) -> tuple[Cell, ...]:
         _seconds(seen.end_s),
         "missed: " + ", ".join(below) if below else "met",
     )
+    print(*row, flush=True)
+    return row
 
 
 def _seconds(value: float | None) -> str:

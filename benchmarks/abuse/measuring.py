@@ -17,7 +17,7 @@ import trustme
 
 from benchmarks.abuse.attacks import SOURCE
 from benchmarks.common.daemon import VIDEO, Process
-from benchmarks.service.viewers import RANGE, Viewer, cut, watch
+from benchmarks.service.viewers import RANGE, Viewer, beside, cut, watch
 
 GIVE_UP_S: Final = 30.0
 """What was not done by then is taken for never."""
@@ -79,15 +79,12 @@ class Probe:
 
 
 @contextlib.contextmanager
-def served(checkout: Path | None, *, tls: bool) -> Iterator[Process]:
-    """Run a daemon of this checkout or another one, until the block ends; it may be gone before."""
+def served(*, tls: bool) -> Iterator[Process]:
+    """Run a daemon until the block ends; it may be gone before."""
     program = Path(sys.executable).with_name("transientcam")
     command: list[str | Path] = [program, "serve", "--port", "0", "--camera", "sim:mirrors"]
     with tempfile.TemporaryDirectory() as name:
         environment = {"XDG_DATA_HOME": name, "TRANSIENTCAM_HISTORY__SECONDS": f"{HISTORY_S}"}
-        if checkout is not None:
-            parts = ("client", "driver", "server")
-            environment["PYTHONPATH"] = ":".join(str(checkout / part) for part in parts)
         if tls:
             command += ["--tls-certificate", _certificate(Path(name))]
         process = Process(command, environment, log=subprocess.DEVNULL)
@@ -116,14 +113,12 @@ def attacked(name: str, url: str, connections: int) -> Iterator[None]:
             attacker.send_signal(signal.SIGKILL)
 
 
-def measure(
-    name: str, connections: int, *, duration_s: float, checkout: Path | None = None
-) -> AttackOutcome:
+def measure(name: str, connections: int, *, duration_s: float) -> AttackOutcome:
     """Attack a fresh daemon, and look what healthy clients have of it meanwhile."""
     tls = name == "silent TLS handshakes"
     seen = AttackOutcome()
     with (
-        served(checkout, tls=tls) as process,
+        served(tls=tls) as process,
         httpx.Client(base_url=process.url, timeout=GIVE_UP_S, verify=False) as client,
     ):
         prepare(process, client)
@@ -136,7 +131,7 @@ def measure(
         probe = Probe(process, client)
         with contextlib.ExitStack() as attack:
             attack.enter_context(attacked(name, process.url, connections))
-            with _probing(probe):
+            with beside(probe.run):
                 frames = _frames(viewer, client, duration_s)
             seen.frames = frames / before if before else 0.0
             seen.lapse_s = _lapse(client)
@@ -155,18 +150,6 @@ def measure(
         if viewer is not None:
             cut([viewer.connection])
     return seen
-
-
-@contextlib.contextmanager
-def _probing(probe: Probe) -> Iterator[None]:
-    ended = threading.Event()
-    thread = threading.Thread(target=probe.run, args=(ended,))
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
 
 
 def prepare(process: Process, client: httpx.Client) -> float:

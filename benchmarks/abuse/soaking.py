@@ -35,7 +35,7 @@ def soak(minutes: float) -> Soak:
     during: list[Sample] = []
     after: list[Sample] = []
     with (
-        served(None, tls=False) as process,
+        served(tls=False) as process,
         httpx.Client(base_url=process.url, timeout=GIVE_UP_S) as client,
     ):
         rate_hz = prepare(process, client)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.accuracy.capturing import dimmest_dn_per_s, looked, measured
-from benchmarks.common.picture import blank, error_picture, errors_m, saved
+from benchmarks.common.picture import blank, error_for_time, error_picture, errors_m, saved
 from benchmarks.common.tables import Table
 from transientcam_driver import Sequence as Capture
 from transientcam_server.planning import Goal, flat_from
@@ -81,13 +81,7 @@ def draw_prices(fronts: Mapping[str, Front], path: Path) -> None:
         time_s = [each["capture_s"] for each in front]
         panel.plot(time_s, [errors_m(each)[2] for each in front], "o-", label=name)
     panel.axhline(TARGET_M, color="black", linestyle="--", linewidth=1)
-    panel.set(
-        xscale="log",
-        yscale="log",
-        xlabel="time of one capture / s",
-        ylabel="range error of the median pixel / m",
-        title="What does 5 mm (dashed) cost? Noise and bias together",
-    )
+    error_for_time(panel, "What does 5 mm (dashed) cost? Noise and bias together")
     panel.grid(alpha=0.25, which="both")
     panel.legend()
     path.write_bytes(saved(figure, "png"))

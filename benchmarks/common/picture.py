@@ -39,13 +39,7 @@ def error_picture(
     time_s = [choice["capture_s"] for choice in front]
     error_m = [choice["predicted"]["range_error_m"]["median"] for choice in front]
     panel.plot(time_s, error_m, "o-", color="black", linewidth=3, label="best for the time")
-    panel.set(
-        xscale="log",
-        yscale="log",
-        xlabel="time of one capture / s",
-        ylabel="range error of the median pixel / m",
-        title=f"{title}: noise (dashed), bias (dotted), both together",
-    )
+    error_for_time(panel, f"{title}: noise (dashed), bias (dotted), both together")
     _shade(panel, front)
     if present is not None:
         panel.plot(*present, "*", color="red", markersize=14, label="present setting")
@@ -53,6 +47,12 @@ def error_picture(
     panel.grid(alpha=0.25)
     figure.supxlabel(tradeoff["summary"], fontsize="small", wrap=True)
     return figure
+
+
+def error_for_time(panel: Axes, title: str) -> None:
+    """Give a panel the axes of error over time."""
+    names = "time of one capture / s", "range error of the median pixel / m"
+    panel.set(xscale="log", yscale="log", xlabel=names[0], ylabel=names[1], title=title)
 
 
 def blank(width_in: float, height_in: float) -> Figure:

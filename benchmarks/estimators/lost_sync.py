@@ -5,6 +5,7 @@ the share of images that lose their synchronisation, and without any. An image i
 two differ.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -25,28 +26,21 @@ _OUTLIER_SHARE_OFF: Final = "&outliers=off"
 _TREATMENTS: Final = ("keep", "repair", "fill")
 _Array = NDArray[Any]
 _STEPS: Final = 4
+_COUNTS: Final = ("corrupt", "in_pairs", "repaired", "left", "missed", "wrong")
 
 
 @dataclass(slots=True)
 class Tally:
     """Corrupt images of one scene by what became of them, and errors in m by treatment."""
 
-    frames: int = 0
-    corrupt_frames: int = 0
-    corrupt: int = 0
-    pairs: int = 0
-    repaired: int = 0
-    wrong: int = 0
-    left: int = 0
-    missed: int = 0
+    counted: Counter[str] = field(default_factory=Counter)
     errors_m: dict[str, list[_Array]] = field(default_factory=dict)
 
     def row(self, name: str) -> list[str]:
         """Return what a row of the table says."""
         errors = [_error(self.errors_m[each]) for each in ("clean", *_TREATMENTS)]
-        counts = (self.corrupt, 2 * self.pairs, self.repaired, self.left, self.missed, self.wrong)
-        corrupt = f"{self.corrupt_frames} of {self.frames}"
-        return [name, corrupt, *(str(count) for count in counts), *errors]
+        counts = [str(self.counted[each]) for each in _COUNTS]
+        return [name, "{corrupt_frames} of {frames}".format(**self.counted), *counts, *errors]
 
 
 def _error(errors_m: list[_Array]) -> str:
@@ -110,22 +104,25 @@ def measure(scene: str, sequence: Capture, frames: int, bench: Bench, seed: int)
 
 def _count(tally: Tally, corrupt: _Array, found: tm.Repair, first: int) -> None:
     """Count the images of a frame by what became of them."""
-    tally.frames += 1
-    tally.corrupt_frames += bool(corrupt.any())
-    tally.corrupt += int(corrupt.sum())
     phased = corrupt[first:].reshape((-1, _STEPS))
-    tally.pairs += int((phased[:, :2] & phased[:, 2:]).sum())
-    tally.repaired += int((corrupt & found.repaired[0]).sum())
-    tally.wrong += int((found.repaired[0] & ~corrupt).sum())
-    tally.left += int((corrupt & found.unrepaired[0]).sum())
-    tally.missed += int((corrupt & ~found.repaired[0] & ~found.unrepaired[0]).sum())
+    repaired, unrepaired = found.repaired[0], found.unrepaired[0]
+    tally.counted.update(
+        frames=1,
+        corrupt_frames=int(corrupt.any()),
+        corrupt=int(corrupt.sum()),
+        in_pairs=2 * int((phased[:, :2] & phased[:, 2:]).sum()),
+        repaired=int((corrupt & repaired).sum()),
+        left=int((corrupt & unrepaired).sum()),
+        missed=int((corrupt & ~repaired & ~unrepaired).sum()),
+        wrong=int((repaired & ~corrupt).sum()),
+    )
 
 
 def tables(*, frames: int = 20) -> Iterator[Table]:
     """Measure so many captures of each scene."""
     bench = Bench()
     rows: list[Sequence[str]] = []
-    total = Tally()
+    total = Counter[str]()
     for scene in ("wall", "mirrors", "corner", "visitor"):
         for zeroth in _ZEROTHS:
             harmonics = 3 if scene == "visitor" else 4
@@ -138,15 +135,12 @@ def tables(*, frames: int = 20) -> Iterator[Table]:
             )
             tally = measure(scene, sequence, frames, bench, seed=len(rows) + 1)
             rows.append(tally.row(f"{scene}, m = {harmonics}, {zeroth}"))
-            for name in ("frames", "corrupt_frames", "corrupt", "repaired", "left", "missed"):
-                setattr(total, name, getattr(total, name) + getattr(tally, name))
-            total.wrong += tally.wrong
+            total.update(tally.counted)
     notes = [
-        f"In all {total.corrupt_frames} of {total.frames} frames are corrupt, by {total.corrupt} "
-        f"images: {total.repaired} are rebuilt, {total.left} are of pairs that are reported as not "
-        f"repaired, {total.missed} are not found (most of them turned by so little that noise "
-        f"hides it). {total.wrong} good images are rebuilt, which happens where the opposite "
-        "one is corrupt as well.",
+        "In all {corrupt_frames} of {frames} frames are corrupt, by {corrupt} images: {repaired} "
+        "are rebuilt, {left} are of pairs that are reported as not repaired, {missed} are not "
+        "found (most of them turned by so little that noise hides it). {wrong} good images are "
+        "rebuilt, which happens where the opposite one is corrupt as well.".format(**total),
         "Errors of the range in mm (maximum entropy): median and 90 % of all lit pixels, and the "
         "median of the worst frame.",
     ]

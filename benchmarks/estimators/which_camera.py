@@ -106,9 +106,8 @@ def table() -> Table:
         f"{WRONG_M:g} m. A corner has a second return half as strong, {CORNER_M[0]:g} to "
         f"{CORNER_M[1]:g} m behind the first, as what bends corners. All cameras have the same "
         "light and time of exposure, which each divides among its frequencies, and noise of "
-        f"{NOISE:.0%} of the light at three frequencies: what each sensor adds to that is known "
-        "once an owner measures it. Light in flight, and the paper's sequence, need consecutive "
-        "multiples; the width is half a period of the highest one."
+        f"{NOISE:.0%} of the light at three frequencies: a sensor's own noise is known once "
+        "an owner measures it."
     )
     return made
 

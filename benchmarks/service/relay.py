@@ -9,14 +9,14 @@ import socket
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Final
 
 import transientcam
 from benchmarks.common.daemon import Process, daemon
 from benchmarks.common.tables import Cell, Table, heads, percentiles
-from benchmarks.service.viewers import RANGE, Viewer, cut, spending, watch
+from benchmarks.service.viewers import RANGE, Viewer, beside, cut, spending, watch
 
 RELAYS: Final = 4
 VIDEO: Final = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 5e-4}
@@ -75,8 +75,13 @@ def kill_one(
     others = [viewer for relay in relays[1:] for viewer in viewers_of(relay, 1)]
     others += viewers_of(origin, 1)
     reconnect = transientcam.Reconnect(first_wait_s=0.1, longest_wait_s=0.5)
+
+    def read(ended: threading.Event) -> None:
+        while not ended.is_set():
+            watch(others, duration_s=0.2)
+
     with (
-        watched(others),
+        beside(read),
         transientcam.Camera(relays[0].url) as camera,
         camera.stream("range", reconnect=reconnect) as stream,
     ):
@@ -90,24 +95,6 @@ def kill_one(
     missing = sum(each.seen.missing for each in others)
     cut(each.connection for each in others)
     return Killed(back_s, len(others), missing)
-
-
-@contextmanager
-def watched(viewers: list[Viewer]) -> Iterator[None]:
-    """Let viewers read on a thread until the block ends."""
-    ended = threading.Event()
-
-    def read() -> None:
-        while not ended.is_set():
-            watch(viewers, duration_s=0.2)
-
-    reading = threading.Thread(target=read)
-    reading.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        reading.join()
 
 
 def measure(

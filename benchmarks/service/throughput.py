@@ -38,15 +38,6 @@ COMPUTED: Final = ("direct", "indirect", "coefficients")
 BAR_HZ: Final = 60.0
 _SETTLE_S = 2.0
 _COMPILED_WITHIN_S = 240.0
-# verbs are found by their entry point, which is that of the tree that is installed
-_SERVE = """
-import typer
-try:
-    from transientcam_server.cli.serve import serve
-except ModuleNotFoundError:
-    from transientcam_server.commands import serve
-typer.run(serve)
-"""
 
 
 @dataclass(frozen=True)
@@ -74,7 +65,8 @@ class Cost:
 def daemon_of(daemon: Daemon, camera: str) -> Iterator[Process]:
     """Run the daemon of a checkout once all its kernels are compiled."""
     path = ":".join(str(daemon.tree / name) for name in ("client", "driver", "server"))
-    command = [sys.executable, "-c", _SERVE, "--port", "0", "--camera", camera]
+    program = Path(sys.executable).with_name("transientcam")
+    command: list[str | Path] = [program, "serve", "--port", "0", "--camera", camera]
     environment = {"PYTHONPATH": path, "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": daemon.estimator}
     with running(command, environment) as process:
         process.settle(_COMPILED_WITHIN_S)

@@ -6,8 +6,10 @@ A client library would spend more on each message than the server under test doe
 import selectors
 import socket
 import struct
+import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -220,6 +222,19 @@ def stuck(url: str, subscribe: dict[str, Any]) -> socket.socket:
     connection = connect(url, receive_bytes=4096)
     send(connection, subscribe)
     return connection
+
+
+@contextmanager
+def beside(run: Callable[[threading.Event], None]) -> Iterator[None]:
+    """Run something on a thread until the block ends, which sets its event."""
+    ended = threading.Event()
+    thread = threading.Thread(target=run, args=(ended,))
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def cut(connections: Iterable[socket.socket]) -> None:

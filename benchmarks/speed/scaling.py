@@ -6,7 +6,7 @@ from functools import partial
 
 import transientcam_moments as tm
 from benchmarks.common.data import CORES, images, one_pass, reconstructor
-from benchmarks.common.tables import Table
+from benchmarks.common.tables import Table, heads
 from benchmarks.common.timing import measure
 
 _M = 4
@@ -18,10 +18,8 @@ def tables() -> Iterator[Table]:
     tm.kernels.compile()
     table = Table(
         f"The whole reconstruction against the number of pixels, m = {_M}, float32, {CORES} cores",
-        ("pixels", "a frame", "ns a pixel", "pixels redone in float64"),
-        notes=[
-            "Small images fit in the caches and pay for the threads; large ones pay for memory."
-        ],
+        heads("pixels | a frame | ns a pixel:.1f | pixels redone in float64:.2%"),
+        notes=["Small images fit in the caches and pay for the threads; large ones for memory."],
     )
     with ThreadPoolExecutor(max(1, CORES - 1)) as executor:
         spread = tm.kernels.over(executor, CORES)
@@ -31,13 +29,7 @@ def tables() -> Iterator[Table]:
             redone = one_pass(_M, shape).images(raw, None, spread).redone
             timing = measure(partial(made, raw, spread=spread), least_s=1.0)
             pixels = shape[0] * shape[1]
-            table.rows.append(
-                (
-                    f"{pixels:.0e}",
-                    str(timing),
-                    f"{timing.median_s / pixels * 1e9:.1f}",
-                    f"{redone / pixels:.2%}",
-                )
-            )
+            each_ns = timing.median_s / pixels * 1e9
+            table.rows.append((f"{pixels:.0e}", str(timing), each_ns, redone / pixels))
             del raw, made
     yield table
