@@ -43,7 +43,7 @@ OPERATORS = re.compile(
 )
 """Without ``|``, which types have, and ``is`` in place of ``==``."""
 UNPACKING = {"argument", "dictorsetmaker", "param", "parameters", "star_expr"}
-CPU_S, TIMEOUT_S = 60, 600.0
+CPU_S, TIMEOUT_S = 120, 600.0
 """Of the tests of one mutant: what a busy machine does not stretch, and for those that wait."""
 LARGE = ("crc32c", "fastapi", "h5py", "httpx", "hypothesis", "numba", "numpy", "scipy.optimize")
 # by pytest's exit code: a test fails; a module or conftest cannot be imported

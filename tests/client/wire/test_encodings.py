@@ -233,7 +233,10 @@ _BRIGHTNESS = wire.array_document(np.ones((2, 3), "<f4"))
         (_CODES, {"encoding": 7}, "encoding"),
         (_CODES, {"encoding": "u16", "offset": 0.0}, "scale"),
         (_CODES, {"encoding": "u16", "scale": 1.0, "offset": float("nan")}, "offset"),
-        (_CODES.astype("|u1"), {"encoding": "u16", "scale": 1.0, "offset": 0.0}, "array.dtype"),
+        *(
+            (_CODES.astype(each), {"encoding": "u16", "scale": 1.0, "offset": 0.0}, "array.dtype")
+            for each in sorted(set(wire.DTYPES) - {"<u2"})
+        ),
         (_PLANES, {"encoding": "u16", "scale": 1.0, "offset": 0.0}, "array.shape"),
         (_CODES, {"encoding": "reflection16", "brightness": _BRIGHTNESS}, "array.shape"),
         (_PLANES[:3], {"encoding": "reflection16", "brightness": _BRIGHTNESS}, "array.shape"),

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+import re
 from typing import Any
 
 import msgpack  # type: ignore[import-untyped]  # it ships no types
@@ -96,6 +97,12 @@ def test_a_recorded_frame_is_parsed(recorded: dict[str, Recording]) -> None:
     assert (frame.frame, frame.channel, frame.product, frame.unit) == (17, 0, "range", "m")
     assert (frame.axes, frame.encode_s, frame.extra) == (("y", "x"), 0.001, {})
     np.testing.assert_array_equal(frame.array, _RANGE_M)
+
+
+def test_a_frame_that_was_not_encoded_took_no_time() -> None:
+    data = wire.encode_frame(product="range", unit="m", axes=("y", "x"), meta={}, array=_RANGE_M)
+
+    assert msgpack.unpackb(data)["encode_s"] == 0.0
 
 
 def test_a_frame_is_encoded_as_recorded(recorded: dict[str, Recording]) -> None:
@@ -530,6 +537,15 @@ def test_every_close_code_is_in_the_specification() -> None:
     never_sent = {wire.CloseCode.ABNORMAL, wire.CloseCode.INTERNAL_ERROR}
     for code in set(wire.CloseCode) - never_sent:
         assert f"| {code} |" in text
+
+
+def test_the_codes_of_trust_are_those_of_the_specification() -> None:
+    text = SPECIFICATION.read_text("utf-8").partition("The codes of `trust`;")[2]
+    codes = re.findall(r"^\| (\d+) \| `(\w+)` \|", text.partition("\n\n`")[0], re.MULTILINE)
+
+    assert [(int(code), name) for code, name in codes] == [
+        (trust.value, name.lower()) for name, trust in wire.Trust.__members__.items()
+    ]
 
 
 def test_every_kind_of_notice_is_in_the_specification_with_its_keys() -> None:

@@ -5,6 +5,7 @@ import io
 import re
 
 import jax
+import matplotlib
 import numpy as np
 from PIL import Image
 
@@ -37,6 +38,16 @@ def test_a_map_has_its_pixels_in_place_brighter_with_the_value_and_grey_without(
     assert (np.diff(brightness) >= 0).all()
     assert brightness[0] < 60
     assert brightness[-1] > 600
+
+
+def test_a_map_has_the_colours_of_a_known_scale() -> None:
+    values = np.repeat(np.arange(5.0), 40)[None]  # 1 and 99 % of them are the ends of the scale
+
+    shown = np.asarray(picture(map_html(values, title="t", unit="m")).convert("RGB"))[0, ::40]
+
+    inferno = matplotlib.colormaps["inferno"](np.arange(5) / 4)[:, :3] * 255
+    np.testing.assert_allclose(shown[1:], inferno[1:], atol=1.6)  # 256 colours
+    np.testing.assert_array_equal(shown[0], 0)
 
 
 def test_a_map_of_more_pixels_than_a_screen_is_thinned_out_and_an_empty_one_is_words() -> None:

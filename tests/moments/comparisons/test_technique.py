@@ -43,6 +43,18 @@ def moments(pixels: int = 6, *, seed: int = 3) -> NDArray[np.complexfloating[Any
     return oracles.moments_of_returns(phase, weight, M)
 
 
+def test_a_technique_of_somebodys_is_planar_of_moments_and_told_nothing_unless_it_says_so() -> None:
+    words: dict[str, Any] = dict.fromkeys(
+        ("label", "returns", "frequencies", "assumptions", "cost", "failure"), ""
+    )
+
+    found = Technique(
+        name="own", **words, harmonics=lambda m: (1,), least_harmonics=1, estimate=abs
+    )
+
+    assert (found.planar, found.measures, found.informed) == (True, "moments", False)
+
+
 @pytest.mark.parametrize("technique", ALL, ids=by_name)
 def test_every_technique_says_what_it_is(technique: Technique) -> None:
     assert comparisons.TECHNIQUES[technique.name] is technique

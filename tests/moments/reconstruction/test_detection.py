@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.compiled_kernels import kernels
+from transientcam_moments.reconstruction._detection import FALSE_ALARMS, undetected_pixels
 
 F_HZ = 23e6
 SHAPE = (48, 64)
@@ -82,6 +83,26 @@ def test_as_few_black_pixels_pass_where_dozens_are_averaged(zeroth: str) -> None
     # they share noise, and pass in patches: one picture may hold none or a sixth of what ten do
     assert np.mean([each.has_range[INNER[0]] for each in found]) <= 0.009
     assert np.mean([each.has_range[INNER[1]] for each in found]) >= 0.99
+
+
+@pytest.mark.parametrize("gap", [1.0, 0.5])
+def test_ambient_light_of_each_pixel_counts_as_noise(gap: float) -> None:
+    """Half of the picture has `gap` times as much signal as noise exceeds, by its own ambient."""
+    ambient = np.zeros(SHAPE)
+    ambient[:, : SHAPE[1] // 2] = 4000.0
+    brightness = np.zeros(SHAPE)
+
+    def noise_of(light: object, ambient: NDArray[np.float64]) -> tm.noise.MomentNoise:
+        return tm.noise.MomentNoise(np.ones((2, 1)) * (1.0 + np.asarray(ambient) / 40.0))
+
+    limit = -2 * np.log(FALSE_ALARMS)  # chi-square of two degrees of freedom: exp(-x / 2)
+    signal = np.sqrt(gap * 1.001 * limit * (1 + ambient / 40.0))
+    moments = np.stack([brightness, signal]) + 0j
+
+    found = undetected_pixels(moments, brightness, noise_of, 0.0, None, ambient)
+
+    assert (found is None) == (gap == 1.0)
+    assert found is None or found.all()
 
 
 @pytest.mark.parametrize("m", [1, 3, 8])

@@ -2,13 +2,19 @@
 
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import h5py
 import pytest
 
 from tests.server.recording.made import APPLIED, CAPABILITIES, frame, header, record
 from tests.server.recording.test_recovery import abandoned
-from transientcam_server.recording import Limits, RecordingWriter, _layout as layout
+from transientcam_server.recording import (
+    Limits,
+    RecordingWriter,
+    _descriptions as descriptions,
+    _layout as layout,
+)
 from transientcam_server.recording._descriptions import Descriptions, of_recorder, of_removed
 from transientcam_server.recording._recorder import Recorder
 
@@ -45,6 +51,24 @@ def described(path: Path) -> dict[str, Any]:
     document = Descriptions().of_file(path)
     assert document is not None
     return document
+
+
+def test_a_file_is_read_again_only_where_it_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = record(tmp_path / "a.h5", 1)
+    reading = Mock(return_value={"state": "complete"})
+    monkeypatch.setattr(descriptions, "_read", reading)
+    known = Descriptions()
+
+    for _ in range(3):
+        known.of_file(path)
+    path.touch()
+    known.of_file(path)
+    known.keep(set())
+    known.of_file(path)
+
+    assert reading.call_count == 3
 
 
 def test_a_whole_recording_is_described_by_its_header_and_end(tmp_path: Path) -> None:

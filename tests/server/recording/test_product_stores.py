@@ -77,6 +77,21 @@ DAMAGED: dict[str, str | bytes] = {
 }
 
 
+@pytest.mark.parametrize(
+    ("stated", "expected"),
+    [(True, True), (False, False), (None, False), ("true", False), (1, False)],
+)
+def test_a_store_has_every_chunk_where_it_says_so(
+    tmp_path: Path, stated: object, *, expected: bool
+) -> None:
+    lay(tmp_path, "good", made(every_chunk_is_written=stated))
+    lay(tmp_path, "older", made())
+
+    chunks = {each.id: each.has_every_chunk for each in ProductStores(tmp_path).all()}
+
+    assert chunks == {"good": expected, "older": False}
+
+
 @pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED)
 def test_a_store_that_cannot_be_read_says_why_and_hides_no_other(
     tmp_path: Path, text: str | bytes

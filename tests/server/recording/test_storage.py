@@ -4,12 +4,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
 
 from tests.server.fuzzing.damage import checked_blocks, lookup3
-from transientcam_server.recording._storage import Storage, read_rows
+from transientcam_server.recording._storage import Storage, is_one_chunk_a_row, read_rows
 
 LISTED = """
 import resource, sys
@@ -51,6 +52,25 @@ def test_a_text_that_states_a_length_of_4_gib_takes_no_memory_where_that_is_limi
     )
 
     assert result.stdout.split() == ["damaged", "True"]
+
+
+@pytest.mark.parametrize(
+    ("chunks", "filters", "expected"),
+    [
+        ((1, 4, 5), {"shuffle": True, "compression": "gzip"}, True),
+        ((1, 4, 5), {"compression": "gzip"}, False),
+        ((1, 4, 5), {}, False),
+        ((2, 4, 5), {"shuffle": True, "compression": "gzip"}, False),
+        ((1, 2, 5), {"shuffle": True, "compression": "gzip"}, False),
+    ],
+)
+def test_blocks_are_a_shuffled_and_deflated_chunk_a_row(
+    tmp_path: Path, chunks: tuple[int, ...], filters: dict[str, Any], *, expected: bool
+) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("raw", (3, 4, 5), "<u2", chunks=chunks, **filters)
+
+        assert is_one_chunk_a_row(Storage(file, 10**9).dataset("raw")) == expected
 
 
 @pytest.mark.parametrize(("rows", "readable"), [(4096, True), (4097, False)])

@@ -94,12 +94,9 @@ def _limits(shortfall: Shortfall) -> tuple[str, str]:
     m = best.applied.sequence.harmonics
     dearer = _dearer(shortfall)
     if field == "range_error_m" and bias_m > noise_m:
-        return (
-            "bias",
-            f"more time does not help here: bias {bias_m * 1e3:.3g} mm at m = {m}{dearer}",
-        )
+        return ("bias", f"more time does not help here: bias {_mm(bias_m)} at m = {m}{dearer}")
     capture_ms = best.applied.capture_s * 1e3
-    return "noise", f"noise {noise_m * 1e3:.3g} mm in {capture_ms:.3g} ms at m = {m}{dearer}"
+    return "noise", f"noise {_mm(noise_m)} in {capture_ms:.3g} ms at m = {m}{dearer}"
 
 
 def _dearer(shortfall: Shortfall) -> str:
@@ -110,7 +107,7 @@ def _dearer(shortfall: Shortfall) -> str:
     factor = dearer.applied.capture_s / best.applied.capture_s
     return (
         f"; m = {dearer.applied.sequence.harmonics} takes {factor:.2g} x as long and is "
-        f"{dearer.error(field) * 1e3:.3g} mm off"
+        f"{_mm(dearer.error(field))} off"
     )
 
 
@@ -151,7 +148,7 @@ def summary(best: Choice, twice: Choice | None, scene: SceneStatistics) -> str:
     """State noise and bias of a choice, and what half its error costs; and any doubt."""
     predicted = best.predicted
     noise_m, bias_m = predicted.range_std.median, predicted.range_bias_m
-    first = f"{noise_m * 1e3:.3g} mm noise, {bias_m * 1e3:.3g} mm off"
+    first = f"{_mm(noise_m)} noise, {_mm(bias_m)} off"
     if best.share is not None:  # more than what noise and bias of the median pixel are together
         first = f"{_error_in_words(best)}, the median one with {first}"
     doubt = _doubt(best, scene)
@@ -200,19 +197,23 @@ def _doubt(choice: Choice, scene: SceneStatistics) -> str:
     apart_m = scene.disagreement_m
     if apart_m > DISAGREEING * choice.predicted.range_error.median:
         return (
-            f" Bias unknown: two ways to tell direct from later light differ by {apart_m * 1e3:.2g}"
-            " mm even at all frequencies, and both may be further off."
+            f" Bias unknown: two ways to tell direct from later light differ by {_mm(apart_m)}"
+            " even at all frequencies, and both may be further off."
         )
     return (
         " Bias unknown: light that goes on coming, as out of wax or from other walls, would look "
-        f"the same, and put the range {choice.predicted.most_bias_m * 1e3:.2g} mm off."
+        f"the same, and put the range {_mm(choice.predicted.most_bias_m)} off."
     )
 
 
 def _error_in_words(choice: Choice) -> str:
     """State the error that targets limit: of the median pixel, or of a share of a capture's."""
     of_share = "" if choice.share is None else f" for {choice.share:.0%} of the pixels"
-    return f"{choice.range_error.median * 1e3:.3g} mm{of_share}"
+    return f"{_mm(choice.range_error.median)}{of_share}"
+
+
+def _mm(length_m: float) -> str:
+    return f"{length_m * 1e3:.3g} mm" if length_m < 1 else f"{length_m:.3g} m"
 
 
 def _time_in_words(time_s: float) -> str:
@@ -228,12 +229,8 @@ def conditions(scene: SceneStatistics) -> str:
         )
     elif scene.uncalibrated_m > _NOTABLE_M:
         said = (
-            " Calibrate with this sequence: without, ranges are "
-            f"{scene.uncalibrated_m * 1e3:.2g} mm off."
+            f" Calibrate with this sequence: without, ranges are {_mm(scene.uncalibrated_m)} off."
         )
     if scene.drift_m > _NOTABLE_M:
-        said += (
-            f" Since the calibration in use ranges may have drifted by {scene.drift_m * 1e3:.2g}"
-            " mm."
-        )
+        said += f" Since the calibration in use ranges may have drifted by {_mm(scene.drift_m)}."
     return said

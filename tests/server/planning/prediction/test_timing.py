@@ -92,6 +92,23 @@ def test_averaging_takes_its_time_for_each_image(
     assert found_s == pytest.approx(5 * once_s + averaging_s)
 
 
+def test_averaging_that_is_not_slower_than_none_adds_nothing(
+    capabilities: Capabilities, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = [0.0]
+
+    def reconstruct(images: Any, settings: tm.Settings, **_: object) -> MagicMock:
+        now_s[0] += 0.25 if settings.takes == 1 else 0.2
+        return MagicMock()
+
+    monkeypatch.setattr(tm.kernels, "settled", lambda names, m: True)
+    monkeypatch.setattr(tm, "reconstruct", reconstruct)
+    small = dataclasses.replace(capabilities, width=8, height=6)
+    seconds = ReconstructionTimer(small, SETTINGS, clock=lambda: now_s[0])
+
+    assert seconds(Sequence(harmonics=5, takes=20), "maximum-entropy") == pytest.approx(0.25)
+
+
 def test_no_computing_time_is_stated_before_the_kernels_of_a_frame_are_there(
     capabilities: Capabilities, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -273,6 +273,20 @@ def test_capabilities_are_taken_up_to_their_limits(
             unpack_capabilities(pack_capabilities(liar))
 
 
+@pytest.mark.parametrize("step_hz", [1e-6, 0.25, 1000.0, (2**32 - 1) / 1e6])
+def test_steps_of_a_synthesiser_are_in_millionths_of_a_hertz(step_hz: float) -> None:
+    stated = replace(
+        CAPABILITIES,
+        tuning_step_hz=step_hz,
+        min_frequency_hz=max(1.0, step_hz),
+        max_frequency_hz=1000 * max(1.0, step_hz),
+        low_frequency_hz=0.0,
+    )
+
+    assert number(pack_capabilities(stated), 104, 4) == round(step_hz * 10**6)
+    assert unpack_capabilities(pack_capabilities(stated)) == stated
+
+
 def test_a_synthesiser_has_steps_of_a_millionth_of_a_hertz_or_more() -> None:
     finest = replace(
         CAPABILITIES,
@@ -464,8 +478,9 @@ def test_answers_of_the_wrong_length_are_protocol_errors(data: bytes) -> None:
         (unpack_time, (8,)),
     ):
         if len(data) not in sizes:
-            with pytest.raises(ProtocolError):
-                unpack(data)
+            for each in (data, b"\1" + data[1:]):  # of the right version, too
+                with pytest.raises(ProtocolError):
+                    unpack(each)
 
 
 @pytest.mark.parametrize("version", [0, 2, 255])

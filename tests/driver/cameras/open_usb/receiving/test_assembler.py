@@ -150,9 +150,10 @@ def test_an_image_that_comes_too_late_counts_as_lost_and_does_no_more_harm() -> 
     assert assembly.counters.duplicates == 1
 
 
-def test_images_of_another_epoch_are_left_out() -> None:
+@pytest.mark.parametrize("epoch", [4, 6])
+def test_images_of_another_epoch_are_left_out(epoch: int) -> None:
     assembly = Assembly(first_image=100 * COUNT)
-    old = [image(k, epoch=4) for k in range(COUNT)]
+    old = [image(k, epoch=epoch) for k in range(100 * COUNT, 101 * COUNT)]
 
     frames = assembly.push(*old, *map(image, range(100 * COUNT, 101 * COUNT)))
 
