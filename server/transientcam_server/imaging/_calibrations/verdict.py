@@ -1,8 +1,10 @@
 """The verdict on a calibration measurement: whether it was measured on a diffuser."""
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, Literal, Self, get_args
 
 Word = Literal["diffusor", "in-doubt", "scene"]
@@ -40,22 +42,8 @@ class Finding:
         }
 
 
-REASONS: Final[Mapping[str, str]] = {
-    "unknown_share": "{value:.0%} of the pixels are too dark, saturated, bad or too noisy to be "
-    "judged (at most {limit:.0%})",
-    "unlike_share": "{value:.0%} of the pixels are unlike a diffuser (at most {limit:.0%})",
-    "residual_m": "the range differs by {value:.2f} m from a smooth field (at most {limit:.2f} m)",
-    "harmonic_phase_rad": "the phases of the harmonics differ by {value:.2f} rad from those of a "
-    "single return (at most {limit:.2f} rad)",
-    "magnitude_share": "the magnitudes of the harmonics vary by {value:.0%} over the sensor (at "
-    "most {limit:.0%}), as those of several returns do",
-    "common_phase_rad": "the phases of the harmonics do not belong to one time, by {value:.2f} rad "
-    "(at most {limit:.2f} rad)",
-    "field_m": "the range changes by {value:.2f} m over the sensor (at most {limit:.2f} m)",
-    "offset_m": "the light comes from {value:.2f} m instead of 0 (at most {limit:.2f} m)",
-    "low_frequency_m": "at the low frequency the light comes from {value:.1f} m instead of 0 (at "
-    "most {limit:.1f} m)",
-}
+_FILE: Final = Path(__file__).with_name("reasons.toml")
+REASONS: Final[Mapping[str, str]] = tomllib.loads(_FILE.read_text("utf-8"))
 """Of a test that failed, in words."""
 _FAR: Final = frozenset({"offset_m", "low_frequency_m"})
 _FLAT_WALL: Final = (

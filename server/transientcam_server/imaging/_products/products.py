@@ -241,99 +241,64 @@ def _intrinsics(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
     return {"intrinsics": asdict(recipe.lens(height, width))}
 
 
-_of_polynomial: Final = partial(
-    Product, needs="coefficients", over_time=True, of_toeplitz=True, reads=("coefficients",)
-)
 _MILLIMETRES: Final = Steps(1e3, "mm")
-_WIRE: Final = wire.PRODUCTS
 
-PRODUCTS: Final[dict[str, Product]] = {
-    product.name: product
-    for product in (
-        Product(_WIRE["range"], "returns", _property("range_m"), steps=_MILLIMETRES),
-        Product(_WIRE["direct"], "returns", _property("direct")),
-        Product(_WIRE["indirect"], "returns", _property("indirect")),
-        Product(_WIRE["uniform"], "returns", _property("uniform"), of_brightness=True),
-        Product(_WIRE["brightness"], "light", _property("brightness"), of_brightness=True),
-        Product(
-            _WIRE["validity"],
-            "light",
-            _property("validity"),
-            of_toeplitz=True,
-            steps=Steps(1e4, "1e-4"),
-        ),
-        *(
-            Product(
-                _WIRE[name],
-                "accuracy",
-                _property(part),
-                of_noise=True,
-                of_toeplitz=name != "range_std",
-                steps=_MILLIMETRES,
-            )
-            for name, part in (
-                ("range_std", "std_m"),
-                ("range_bias", "bias_m"),
-                ("range_error", "error_m"),
-            )
-        ),
-        Product(_WIRE["trust"], "accuracy", _property("trust"), of_noise=True, of_toeplitz=True),
-        Product(
-            _WIRE["reduced_chi_square"],
-            "misfit",
-            _property("reduced_chi_square"),
-            of_noise=True,
-            steps=Steps(1e2, "1e-2"),
-        ),
-        Product(_WIRE["frames_averaged"], "light", _frames_averaged),
-        Product(_WIRE["flags"], "light", _property("flags")),
-        Product(
-            _WIRE["coefficients"],
-            "coefficients",
-            _coefficient_planes,
-            of_view=True,
-            of_toeplitz=True,
-        ),
-        Product(_WIRE["moments"], "moments", _property("moments"), fields=_frequencies),
-        Product(_WIRE["measured_moments"], "moments", _property("measured"), fields=_frequencies),
-        Product(_WIRE["raw"], "raw", _property("images"), fields=_labels, archive=_evaluation),
-        _of_polynomial(_WIRE["transient"], compute=_transient),
-        Product(
-            _WIRE["density_std"],
-            "moments",
-            _density_std,
-            over_time=True,
-            of_noise=True,
-            of_toeplitz=True,
-            reads=("smoothed", "ambient", "settings", "variance_share"),
-        ),
-        _of_polynomial(_WIRE["cumulative"], compute=_cumulative),
-        _of_polynomial(
-            _WIRE["streak"],
-            compute=_streak,
-            of_row=True,
-            steps=Steps(1e-7, "1e7 DN/s"),
-            fields=lambda recipe, raw, view: {"y": view.y},
-        ),
-        Product(
-            _WIRE["bounds"],
-            "moments",
-            _bounds,
-            over_time=True,
-            of_toeplitz=True,
-            reads=("moments",),
-            fields=lambda recipe, raw, view: {"radius": BOUNDS_RADIUS},
-        ),
-        Product(_WIRE["returns"], "returns", _return_planes, of_view=True),
-        Product(_WIRE["pointcloud"], "returns", _pointcloud, fields=_intrinsics),
-        Product(_WIRE["truth"], "truth", _property("range_m"), steps=_MILLIMETRES),
-        Product(
-            _WIRE["direct_share"], "truth", _property("direct_share"), steps=Steps(1e4, "1e-4")
-        ),
-    )
-}
+
+def _product(
+    name: str, needs: str, compute: Callable[..., _Array] | str, **more: Any
+) -> tuple[str, Product]:
+    """Return one of ours by its name, computed as it says or a property of its input."""
+    called = _property(compute) if isinstance(compute, str) else compute
+    return name, Product(wire.PRODUCTS[name], needs, called, **more)
+
+
+_of_noise: Final = partial(_product, of_noise=True)
+_of_accuracy: Final = partial(_of_noise, needs="accuracy", steps=_MILLIMETRES)
+_over_time: Final = partial(_product, over_time=True, of_toeplitz=True)
+_of_polynomial: Final = partial(_over_time, needs="coefficients", reads=("coefficients",))
+_TEN_THOUSANDTHS: Final = Steps(1e4, "1e-4")
+
+PRODUCTS: Final = dict((
+    _product("range", "returns", "range_m", steps=_MILLIMETRES),
+    _product("direct", "returns", "direct"),
+    _product("indirect", "returns", "indirect"),
+    _product("uniform", "returns", "uniform", of_brightness=True),
+    _product("brightness", "light", "brightness", of_brightness=True),
+    _product("validity", "light", "validity", of_toeplitz=True, steps=_TEN_THOUSANDTHS),
+    _of_accuracy("range_std", compute="std_m"),
+    _of_accuracy("range_bias", compute="bias_m", of_toeplitz=True),
+    _of_accuracy("range_error", compute="error_m", of_toeplitz=True),
+    _of_noise("trust", "accuracy", "trust", of_toeplitz=True),
+    _of_noise(
+        "reduced_chi_square", "misfit", "reduced_chi_square", steps=Steps(1e2, "1e-2")
+    ),
+    _product("frames_averaged", "light", _frames_averaged),
+    _product("flags", "light", "flags"),
+    _product("coefficients", "coefficients", _coefficient_planes, of_view=True, of_toeplitz=True),
+    _product("moments", "moments", "moments", fields=_frequencies),
+    _product("measured_moments", "moments", "measured", fields=_frequencies),
+    _product("raw", "raw", "images", fields=_labels, archive=_evaluation),
+    _of_polynomial("transient", compute=_transient),
+    _over_time(
+        "density_std", "moments", _density_std, of_noise=True,
+        reads=("smoothed", "ambient", "settings", "variance_share"),
+    ),
+    _of_polynomial("cumulative", compute=_cumulative),
+    _of_polynomial(
+        "streak", compute=_streak, of_row=True, steps=Steps(1e-7, "1e7 DN/s"),
+        fields=lambda recipe, raw, view: {"y": view.y},
+    ),
+    _over_time(
+        "bounds", "moments", _bounds, reads=("moments",),
+        fields=lambda recipe, raw, view: {"radius": BOUNDS_RADIUS},
+    ),
+    _product("returns", "returns", _return_planes, of_view=True),
+    _product("pointcloud", "returns", _pointcloud, fields=_intrinsics),
+    _product("truth", "truth", "range_m", steps=_MILLIMETRES),
+    _product("direct_share", "truth", "direct_share", steps=_TEN_THOUSANDTHS),
+))  # fmt: skip
 """Ours by name: an entry here and one in `transientcam.wire.PRODUCTS` make a product."""
-OF_PACKAGES.taken.update(PRODUCTS, *(each.axes for each in _WIRE.values()))
+OF_PACKAGES.taken.update(PRODUCTS, *(each.axes for each in wire.PRODUCTS.values()))
 OF_PACKAGES.taken.update(("frame", "pixel", "device_time_s", "host_time_s"))  # beside products
 
 
@@ -356,7 +321,7 @@ def product_of(name: str) -> Product:
         partial(_mapped, name),
         of_toeplitz=stated.consecutive,
         stated=stated,
-        steps={"m": _MILLIMETRES, "1": Steps(1e4, "1e-4")}.get(stated.unit),
+        steps={"m": _MILLIMETRES, "1": _TEN_THOUSANDTHS}.get(stated.unit),
     )
 
 
