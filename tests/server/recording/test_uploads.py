@@ -90,8 +90,10 @@ def test_what_is_no_whole_recording_is_refused_by_what_is_wrong(
 ) -> None:
     harm(original)
 
-    with pytest.raises(ValueError, match=reason):
+    with pytest.raises(ValueError, match=reason) as refused:
         written(child, original)
+
+    assert str(original.parent) not in str(refused.value)  # where it lies is nobody's business
 
 
 def test_it_is_written_no_longer_than_allowed_and_leaves_the_disk_its_reserve(
