@@ -22,3 +22,8 @@ def plain(text: str, *, lines: bool = False) -> str:
         else each.encode("unicode_escape").decode()
         for each in text
     )
+
+
+def figures(value: float, digits: int) -> str:
+    """Return a number with so many significant digits, and never with an exponent."""
+    return f"{float(f'{value:.{digits}g}'):.15g}" if abs(value) < 1e15 else f"{value:g}"

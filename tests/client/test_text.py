@@ -1,11 +1,12 @@
 """Text from elsewhere, as it may be shown."""
 
+import math
 import unicodedata
 
 import pytest
 from hypothesis import given, strategies as st
 
-from transientcam.text import plain
+from transientcam.text import figures, plain
 
 
 @pytest.mark.parametrize(
@@ -44,3 +45,21 @@ def test_no_control_and_no_turn_is_left_whatever_came(text: str) -> None:
     assert not any(ord(each) < 0x20 or 0x7F <= ord(each) < 0xA0 for each in shown)
     assert not any(unicodedata.bidirectional(each) in turns for each in shown)
     shown.encode()  # it can be written
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "shown"),
+    [
+        (120.4, 2, "120"),
+        (1234.5, 3, "1230"),
+        (0.012345, 3, "0.0123"),
+        (10.0, 3, "10"),
+        (-99.96, 3, "-100"),
+        (5e9, 2, "5000000000"),
+        (0.0, 3, "0"),
+        (math.inf, 2, "inf"),
+        (math.nan, 2, "nan"),
+    ],
+)
+def test_figures_have_their_digits_and_no_exponent(value: float, digits: int, shown: str) -> None:
+    assert figures(value, digits) == shown

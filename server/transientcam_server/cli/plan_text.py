@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from transientcam.cli.terminal import echo
+from transientcam.text import figures
 
 MOVING: Final = 0.02
 """Share of moving pixels from which on it is said."""
@@ -26,9 +27,9 @@ def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
             f"{document['computing_share']:.1%} of the time"
         )
     echo(
-        f"error {error['median'] * 1e3:.2f} mm in the median pixel ({_interval_mm(error, '.2f')}), "
+        f"error {error['median'] * 1e3:.2f} mm in the median pixel ({_interval_mm(error)}), "
         f"{error['p90'] * 1e3:.2f} mm at 90 %: "
-        f"noise {std['median'] * 1e3:.2f} mm, bias {_bias_mm(predicted, '.2f')} mm"
+        f"noise {std['median'] * 1e3:.2f} mm, bias {_bias_mm(predicted)} mm"
     )
     if predicted["within"] is not None:
         _print_within(predicted["within"], document["region"])
@@ -41,7 +42,7 @@ def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
     if predicted["separation_share"] is not None:
         echo(f"finds both returns in {predicted['separation_share']:.0%} of captures")
     if predicted["bound_width"] is not None:
-        echo(f"bounds {predicted['bound_width']:.3g} times the mean density apart")
+        echo(f"bounds {figures(predicted['bound_width'], 3)} times the mean density apart")
     for name, what in (("half_time", "half the time"), ("twice_accuracy", "twice the accuracy")):
         _print_neighbour(what, document[name])
 
@@ -50,8 +51,8 @@ def print_front(document: Mapping[str, Any]) -> None:
     """Print the sequences that no other beats, by rising time, and a sentence about them."""
     rows = [_COLUMNS, *(_row(each) for each in document["front"])]
     widths = [max(len(row[k]) for row in rows) for k in range(len(_COLUMNS) - 1)]
-    for *figures, words in rows:
-        cells = [cell.rjust(width) for cell, width in zip(figures, widths, strict=True)]
+    for *numbers, words in rows:
+        cells = [cell.rjust(width) for cell, width in zip(numbers, widths, strict=True)]
         echo("  ".join([*cells, words]))
     echo(document["summary"])
 
@@ -70,12 +71,12 @@ def _row(choice: Mapping[str, Any]) -> tuple[str, ...]:
     predicted = choice["predicted"]
     error = predicted["range_error_m"]
     return (
-        f"{choice['capture_s'] * 1e3:.4g}",
-        f"{error['median'] * 1e3:.3g}",
-        _interval_mm(error, ".3g"),
-        f"{error['p90'] * 1e3:.3g}",
-        f"{predicted['range_std_m']['median'] * 1e3:.3g}",
-        _bias_mm(predicted, ".3g"),
+        figures(choice["capture_s"] * 1e3, 4),
+        figures(error["median"] * 1e3, 3),
+        _interval_mm(error, 3),
+        figures(error["p90"] * 1e3, 3),
+        figures(predicted["range_std_m"]["median"] * 1e3, 3),
+        _bias_mm(predicted, 3),
         in_words(Sequence.from_document(choice["sequence"]), choice["estimator"]),
     )
 
@@ -86,7 +87,7 @@ def _print_within(within: Mapping[str, Any], region: object) -> None:
     met = "" if target_m is None else f"; {within['target_share']:.0%} within {target_m * 1e3:g} mm"
     echo(
         f"a capture has {within['share']:.0%} of {where} within {within['error_m'] * 1e3:.2f} mm "
-        f"({_interval_mm(within, '.2f')}){met}"
+        f"({_interval_mm(within)}){met}"
     )
 
 
@@ -107,22 +108,24 @@ def _print_price(price: Mapping[str, Any], computing_s: Mapping[str, float | Non
     echo(f"{megabytes:.2f} MB a capture; the light is on for {price['light_share']:.0%} of it")
 
 
-def _interval_mm(figure: Mapping[str, Any], digits: str) -> str:
-    low, high = figure["low"], figure["high"]
-    if high is None:
-        return f"at least {low * 1e3:{digits}}"
-    return f"{low * 1e3:{digits}} to {high * 1e3:{digits}}"
+def _interval_mm(figure: Mapping[str, Any], digits: int | None = None) -> str:
+    low, high = (None if at is None else _mm(at, digits) for at in (figure["low"], figure["high"]))
+    return f"at least {low}" if high is None else f"{low} to {high}"
 
 
-def _bias_mm(predicted: Mapping[str, Any], digits: str) -> str:
+def _bias_mm(predicted: Mapping[str, Any], digits: int | None = None) -> str:
     """Return a bias in mm; with a question mark where the look does not tell it."""
-    return f"{predicted['range_bias_m'] * 1e3:{digits}}" + "?" * (not predicted["bias_known"])
+    return _mm(predicted["range_bias_m"], digits) + "?" * (not predicted["bias_known"])
+
+
+def _mm(length_m: float, digits: int | None) -> str:
+    return f"{length_m * 1e3:.2f}" if digits is None else figures(length_m * 1e3, digits)
 
 
 def _print_scene(scene: Mapping[str, Any]) -> None:
     echo(
         f"seen: {scene['lit_share']:.0%} of the pixels lit, at {scene['range_m']:.2f} m; "
-        f"{scene['ambient_dn_per_s']:.3g} DN/s of ambient light"
+        f"{figures(scene['ambient_dn_per_s'], 3)} DN/s of ambient light"
     )
     if scene["moving_share"] > MOVING:
         echo(
@@ -136,8 +139,9 @@ def _print_neighbour(what: str, other: Mapping[str, Any] | None) -> None:
     if other is None:
         echo(f"{what}: no sequence does")
         return
-    errors = "" if other["error_factor"] is None else f"{other['error_factor']:.2g} x the error, "
+    factor, slower = other["error_factor"], figures(other["time_factor"], 2)
+    errors = "" if factor is None else f"{figures(factor, 2)} x the error, "
     echo(
-        f"{what}: {errors}{other['time_factor']:.2g} x the time, estimator {other['estimator']}: "
+        f"{what}: {errors}{slower} x the time, estimator {other['estimator']}: "
         f"{json.dumps(other['sequence'])}"
     )

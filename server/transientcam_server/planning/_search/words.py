@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from transientcam.text import figures
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.planning._prediction.measures import DISAGREEING
 from transientcam_server.planning._scene.scene import SceneStatistics
@@ -95,8 +96,8 @@ def _limits(shortfall: Shortfall) -> tuple[str, str]:
     dearer = _dearer(shortfall)
     if field == "range_error_m" and bias_m > noise_m:
         return ("bias", f"more time does not help here: bias {_mm(bias_m)} at m = {m}{dearer}")
-    capture_ms = best.applied.capture_s * 1e3
-    return "noise", f"noise {_mm(noise_m)} in {capture_ms:.3g} ms at m = {m}{dearer}"
+    capture = _time_in_words(best.applied.capture_s)
+    return "noise", f"noise {_mm(noise_m)} in {capture} at m = {m}{dearer}"
 
 
 def _dearer(shortfall: Shortfall) -> str:
@@ -106,7 +107,7 @@ def _dearer(shortfall: Shortfall) -> str:
         return ""
     factor = dearer.applied.capture_s / best.applied.capture_s
     return (
-        f"; m = {dearer.applied.sequence.harmonics} takes {factor:.2g} x as long and is "
+        f"; m = {dearer.applied.sequence.harmonics} takes {figures(factor, 2)} x as long and is "
         f"{_mm(dearer.error(field))} off"
     )
 
@@ -134,9 +135,9 @@ def price_in_words(best: Choice, found: list[Change], goal: Goal) -> str:
     gains = [
         f"{_WORDS[each.what]} gives "
         + (
-            f"{each.time_factor:.2g} x"
+            f"{figures(each.time_factor, 2)} x"
             if goal.targets
-            else f"{each.error_factor:.2g} x the accuracy"
+            else f"{figures(each.error_factor, 2)} x the accuracy"
         )
         for each in found
     ]
@@ -160,7 +161,7 @@ def summary(best: Choice, twice: Choice | None, scene: SceneStatistics) -> str:
         )
     factor = twice.applied.capture_s / best.applied.capture_s
     error = _error_in_words(twice)
-    return f"{first}: {twice.in_words()} takes {factor:.2g} x as long for {error}." + doubt
+    return f"{first}: {twice.in_words()} takes {figures(factor, 2)} x as long for {error}." + doubt
 
 
 def summary_of_front(front: list[Choice], scene: SceneStatistics) -> str:
@@ -213,11 +214,11 @@ def _error_in_words(choice: Choice) -> str:
 
 
 def _mm(length_m: float) -> str:
-    return f"{length_m * 1e3:.3g} mm" if length_m < 1 else f"{length_m:.3g} m"
+    return f"{figures(length_m * 1e3, 3)} mm"
 
 
 def _time_in_words(time_s: float) -> str:
-    return f"{time_s:.3g} s" if time_s >= 1 else f"{time_s * 1e3:.3g} ms"
+    return f"{figures(time_s, 3)} s" if time_s >= 1 else f"{time_s * 1e3:.3g} ms"
 
 
 def conditions(scene: SceneStatistics) -> str:

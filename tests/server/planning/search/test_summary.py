@@ -73,7 +73,7 @@ def test_where_nothing_halves_the_error_what_would_come_nearest_is_named(
         (doubtful(apart_m=1.26e-3), "direct from later light differ by 1.26 mm"),
         (doubtful(apart_m=0.999), "differ by 999 mm"),
         (doubtful(dim_share=0.25, apart_m=1.0), "25% of the lit pixels are so dim"),
-        (doubtful(dim_share=0.24, apart_m=1.0), "differ by 1 m"),
+        (doubtful(dim_share=0.24, apart_m=1.0), "differ by 1000 mm"),
     ],
 )
 def test_a_doubt_is_stated_by_its_gravest_reason(
