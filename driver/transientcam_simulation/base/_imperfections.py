@@ -120,6 +120,18 @@ class DeviceProfile:
     outliers: Outliers | None = None
     lens_scatter: LensScatter | None = None
     dark_current: DarkCurrent | None = None
+    jitter: tuple[float, float] | None = None
+    """Standard deviations from image to image, of the light's delay in s and of its power."""
+    ghost: float | None = None
+    crosstalk: float | None = None
+    """Shares of the light that go to the opposite place, and to a pixel's four neighbours."""
+    blooming: float | None = None
+    """Share of the charge beyond a full well that goes to the four neighbours."""
+    hot_pixels: tuple[float, float] | None = None
+    noisy_pixels: tuple[float, float] | None = None
+    """Shares of the pixels, and means of exponentially distributed electrons a second, or noise."""
+    non_linearity: float | None = None
+    """Share of a full well that it reads less, by the square of the charge."""
     seed: int = 0
 
     def described(self, lens: Lens) -> str:
@@ -152,7 +164,11 @@ PROTOTYPE = DeviceProfile(
     lens_scatter=LensScatter(share=0.02, width=0.15),  # chosen
 )
 
-TYPICAL = replace(PROTOTYPE, name="typical", dark_current=DarkCurrent(2e5))
+TYPICAL = replace(
+    PROTOTYPE, name="typical", dark_current=DarkCurrent(2e5), jitter=(2e-11, 5e-3), ghost=0.01,
+    crosstalk=0.02, blooming=0.3, hot_pixels=(1e-3, 1e6), noisy_pixels=(1e-3, 300.0),
+    non_linearity=0.02,
+)  # fmt: skip
 """The prototype, and chosen figures of what is not known of it: for effects that are forced on."""
 TYPICAL_LENS = Lens((-0.12, 0.02, 0.0, 0.0, 0.0), (0.0, 0.0), 4.0)
 

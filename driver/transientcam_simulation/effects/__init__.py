@@ -19,6 +19,16 @@ from transientcam_simulation.effects._effect import (
     ShotEffect,
     Stage,
 )
+from transientcam_simulation.effects._faults import (
+    Blooming,
+    Crosstalk,
+    Ghost,
+    HotPixels,
+    Jitter,
+    LensScatter,
+    NoisyPixels,
+    NonLinearity,
+)
 from transientcam_simulation.effects._glimpses import Facts, Glimpse, Noise, Values
 from transientcam_simulation.effects._in_scene import (
     DiffuseInterreflection,
@@ -40,7 +50,7 @@ from transientcam_simulation.effects._of_lamp import (
     SynchronisationOutliers,
     ThermalDrift,
 )
-from transientcam_simulation.effects._of_lens import Distortion, LensScatter, Vignetting
+from transientcam_simulation.effects._of_lens import Distortion, Vignetting
 from transientcam_simulation.effects._of_sensor import (
     FEW_E,
     DarkCurrentElectrons,
@@ -60,7 +70,8 @@ NOISE = (ShotNoise, ReadNoise)
 EFFECTS: tuple[type[Effect], ...] = (
     Distortion, MirrorPaths, GlassPanes, Gloss, DiffuseInterreflection, Scattering, MixedPixels,
     MotionDuringSequence, MotionBlur, ModulationHarmonics, AmbientLight, AmplitudeRollOff,
-    LensScatter, Vignetting, PixelPattern, DarkCurrentElectrons, ThermalDrift,
-    SynchronisationOutliers, Saturation, *NOISE, Quantisation,
+    LensScatter, Ghost, Vignetting, Crosstalk, PixelPattern, DarkCurrentElectrons, ThermalDrift,
+    SynchronisationOutliers, Jitter, HotPixels, Blooming, Saturation, *NOISE, NoisyPixels,
+    NonLinearity, Quantisation,
 )  # fmt: skip
 """In the order in which they happen."""

@@ -125,6 +125,11 @@ class Conditions:
         """Brightness that changes no moment by more than a tenth of the noise of a dark pixel."""
         return CALLED_ABOVE * float(self.noise.deviation(0.0, 0.0))
 
+    @property
+    def per_e(self) -> float:
+        """Error of a moment by one electron's in each image."""
+        return 2 / math.sqrt(self.sequence.takes) / self.scale_e
+
     def of_light(self, share: float) -> tuple[Values, ...]:
         """Return a change by the same share of the light in every pixel, by glimpse."""
         return tuple(share * each.brightness for each in self.glimpses)

@@ -39,19 +39,34 @@ class LightPlanes:
     mean: Plane
     terms: dict[int, NDArray[np.complex64]] = field(default_factory=dict)
 
+    def move(self, share: float, moved: Callable[[NDArray[Any]], NDArray[Any]]) -> None:
+        """Move a share of all light to other pixels; what is even stays so."""
+
+        def mixed(plane: NDArray[Any]) -> NDArray[Any]:
+            return ((1 - share) * plane + share * moved(plane)).astype(plane.dtype)
+
+        self.mean = mixed(self.mean)
+        if isinstance(self.constant, np.ndarray):
+            self.constant = mixed(self.constant)
+        self.terms = {k: mixed(term) for k, term in self.terms.items()}
+
 
 @dataclass(slots=True)
 class Shot:
     """The differences of one image from the others of its frequency.
 
-    ``delay_s`` is added to all times of flight; the modulated part is multiplied by ``factor``.
+    Two taps of one ``exposure`` have numbers of their own.
+    ``delay_s`` is added to all times of flight; the modulated part is multiplied by ``factor``, all
+    of the camera's own light by ``power``.
     """
 
     number: int
     device_time_s: float
     seed: int
+    exposure: int
     delay_s: float = 0.0
     factor: complex = 1.0
+    power: float = 1.0
 
 
 @dataclass(slots=True)

@@ -47,6 +47,11 @@ class Glimpse:
     shape: tuple[int, int]
     """Rows and columns of these pixels."""
 
+    @property
+    def plane(self) -> Values:
+        """The brightness in rows and columns."""
+        return self.brightness.reshape(self.shape)
+
     @cached_property
     def lit(self) -> NDArray[np.bool_]:
         """Which pixels any light reaches."""

@@ -106,6 +106,7 @@ class DifferentialPixels:
         sequence = _sequence(frequency_hz, exposure_s)
         if sequence not in self._worlds:
             world = copy.copy(base)  # the same light; what is planned for a sequence is its own
+            world.taps = 2
             world.configure(sequence, sequence.labels)
             world.prepare()
             self._worlds[sequence] = world

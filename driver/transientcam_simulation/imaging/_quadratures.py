@@ -28,6 +28,14 @@ class Quadratures:
         dark = not np.ndim(planes.constant) and not planes.constant
         return cls(planes.constant, planes.mean if dark else planes.mean + planes.constant, terms)
 
+    def lit(self, phasors: dict[int, complex], power: float) -> Plane:
+        """Electrons of an image with the light on, which has this share of its power."""
+        electrons = self.at(phasors, illumination=True)
+        if power != 1:
+            electrons *= np.float32(power)
+            electrons += np.float32(1 - power) * self.constant
+        return electrons
+
     def at(self, phasors: dict[int, complex], *, illumination: bool) -> Plane:
         """Electrons of an image, given exp(i k theta) of each harmonic."""
         if not illumination:

@@ -106,6 +106,7 @@ def _split(stages: tuple[Stage, ...]) -> tuple[tuple[Stage, ...], _OnePass | Non
     """Return the stages before noise, and what draws it and rounds at once, if it can."""
     noisy = [k for k, stage in enumerate(stages) if stage.adds_variance]
     last = stages[-1] if stages else None
-    if not noisy or noisy[-1] != len(stages) - 3 or not isinstance(last, Quantisation):
+    even = all(isinstance(stages[k], ShotNoise | ReadNoise) for k in noisy)
+    if not even or not noisy or noisy[-1] != len(stages) - 3 or not isinstance(last, Quantisation):
         return stages, None
     return stages[: noisy[0]], _OnePass(list(stages[noisy[0] : -2]), last)

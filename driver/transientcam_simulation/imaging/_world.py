@@ -95,6 +95,9 @@ class World:
     ``readout_s``: time between two exposures.
     """
 
+    taps = 1
+    """How many images with successive numbers show one exposure."""
+
     def __init__(
         self,
         scenery: Scenery,
@@ -176,7 +179,8 @@ class World:
     ) -> NDArray[np.float32]:
         """Electrons (H, W) of an image on average, before noise and the converter."""
         plan = self._configured()
-        shot = Shot(number, device_time_s, self._seed)
+        exposure = (number + self.taps - 1) // self.taps
+        shot = Shot(number, device_time_s, self._seed, exposure)
         for effect in plan.on_shot:
             effect.on_shot(shot)
         return self._mean_e(plan, label, shot)
@@ -266,7 +270,8 @@ class World:
             at_s = time_s + (instant + 0.5) / plan.instants * plan.sequence.exposure_s
             light = self._quadratures(plan, label.harmonic, at_s)
             phasors = {k: complex(np.exp(1j * k * turn_rad)) * out_of_step for k, *_ in light.terms}
-            seen.append(light.at(phasors, illumination=label.illumination))
+            lit = label.illumination
+            seen.append(light.lit(phasors, shot.power) if lit else light.at({}, illumination=lit))
         plan.time_s = time_s + 0.5 * plan.sequence.exposure_s
         return seen[0] if len(seen) == 1 else np.array(seen).mean(axis=0)
 

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,17 +205,39 @@ def _device(table: Table, folder: Path | None) -> DeviceProfile:
         profile = replace(profile, waveform=Waveform(file=_file(table, "waveform_file", folder)))
     if "pattern" in table:
         profile = replace(profile, pattern=_pattern(table.table("pattern"), folder))
-    if "drift" in table:
-        profile = replace(profile, drift=_drift(table.table("drift")))
-    if "lens_scatter" in table:
-        profile = replace(profile, lens_scatter=_lens_scatter(table.table("lens_scatter")))
     if "dark_current_e_per_s" in table:
         current = DarkCurrent(table.number("dark_current_e_per_s", least=0, most=MOST_E))
         profile = replace(profile, dark_current=current)
     if "outlier_share" in table:
         share = table.number("outlier_share", least=0, most=1)
         profile = replace(profile, outliers=Outliers(share))
-    return table.done(profile)
+    figures: dict[str, Any] = {
+        key: table.number(key, least=0, most=most) for key, most in _SHARES.items() if key in table
+    }
+    for key, (kind, *limits) in _FIGURES.items():
+        if key in table:
+            own = table.table(key)
+            read = [own.number(name, *of, least=n, most=m) for name, n, m, *of in limits]
+            figures[key] = own.done(kind(*read))
+    return table.done(replace(profile, **figures))
+
+
+def _pair(*figures: float) -> tuple[float, ...]:
+    return figures
+
+
+_SHARES = {"ghost": 0.5, "crosstalk": 0.8, "blooming": 0.9, "non_linearity": 0.5}
+_FIGURES: dict[str, Any] = {
+    "drift": (
+        Drift, ("rise_c", -1e4, 1e4), ("time_constant_s", 1e-6, 1e9),
+        ("delay_s_per_c", -MOST_S, MOST_S),
+    ),
+    "lens_scatter": (LensScatter, ("share", 0, 0.5), ("width", 1e-6, 1e6, 0.15)),
+    "jitter": (_pair, ("delay_s", 0, MOST_S, 0.0), ("power", 0, 0.3, 0.0)),
+    "hot_pixels": (_pair, ("share", 0, 1), ("electrons_per_s", 0, MOST_E)),
+    "noisy_pixels": (_pair, ("share", 0, 1), ("electrons", 0, 1e9)),
+}  # fmt: skip
+"""Tables of a device: what they make, and the limits of numbers, and their defaults."""
 
 
 def _pattern(table: Table, folder: Path | None) -> Pattern:
@@ -236,25 +258,6 @@ def _file(table: Table, key: str, folder: Path | None) -> Path:
     if folder is None:
         raise table.error(key, name, "absent: a scene that is sent cannot name files")
     return folder / name
-
-
-def _drift(table: Table) -> Drift:
-    return table.done(
-        Drift(
-            rise_c=table.number("rise_c", least=-1e4, most=1e4),
-            time_constant_s=table.number("time_constant_s", least=1e-6, most=1e9),
-            delay_s_per_c=table.number("delay_s_per_c", least=-MOST_S, most=MOST_S),
-        )
-    )
-
-
-def _lens_scatter(table: Table) -> LensScatter:
-    return table.done(
-        LensScatter(
-            share=table.number("share", least=0, most=0.5),
-            width=table.number("width", 0.15, least=1e-6, most=1e6),
-        )
-    )
 
 
 def _transport(table: Table) -> Transport:

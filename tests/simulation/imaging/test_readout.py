@@ -44,6 +44,10 @@ def codes(effects: dict[str, str], seed: int) -> bytes:
         {"shot-noise": "off"},
         NO_NOISE,
         {"modulation-harmonics": "on"},
+        {"hot-pixels": "on", "jitter": "on"},
+        {"blooming": "on"},
+        {"noisy-pixels": "on"},
+        {"non-linearity": "on"},
     ],
 )
 @pytest.mark.parametrize("seed", [1, 2])

@@ -49,6 +49,10 @@ profile = "ideal"
 seed = 4
 dark_current_e_per_s = 100.0
 outlier_share = 0.01
+ghost = 0.01
+crosstalk = 0.02
+blooming = 0.3
+non_linearity = 0.02
 [device.pattern]
 delay_s = 1e-10
 gain = 0.01
@@ -59,6 +63,15 @@ delay_s_per_c = 1e-12
 [device.lens_scatter]
 share = 0.05
 width = 0.15
+[device.jitter]
+delay_s = 1e-11
+power = 0.01
+[device.hot_pixels]
+share = 0.01
+electrons_per_s = 1e5
+[device.noisy_pixels]
+share = 0.01
+electrons = 100.0
 [transport]
 mirror_bounces = 1
 diffuse_bounces = 1
