@@ -1,13 +1,14 @@
-"""Faults of a device: rows of words, of what they change, and of what they do."""
+"""Faults that a device may have: of its lamp, its lens and its pixels."""
 
 import math
-from collections.abc import Callable
+from abc import abstractmethod
 from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_simulation.base import LensScatter as Scattering
 from transientcam_simulation.effects._conditions import Call, Conditions, weigh
 from transientcam_simulation.effects._effect import (
     Effect,
@@ -20,27 +21,25 @@ from transientcam_simulation.effects._effect import (
 )
 from transientcam_simulation.effects._glimpses import Glimpse, Values
 
+_Plane = NDArray[Any]
+_Some = tuple[float, float]
 _MOST_SPILLS = 64  # by then less than a hundredth is left
-_Change = Callable[[Conditions, Any, Glimpse], Values]
-_Drawn = Callable[[np.random.Generator, Any, Conditions], Values]
 
 
 class _Fault(Effect):
     """One that is called for by how far the device's figures move moments.
 
-    On planes it costs nothing where the scene stands still. ``plane`` is drawn from the device's
-    seed, for all scenes.
+    ``reason`` is a format string of the figures. On planes a fault costs nothing where the scene
+    stands still.
     """
 
     reason: ClassVar[str]
-    cost_s: ClassVar[float]
-    change: ClassVar[Any]
-    drawn: ClassVar[Any]
+    cost_s_per_pixel: ClassVar[float]
 
-    def __init__(self, conditions: Conditions) -> None:
-        super().__init__(conditions)
-        random = _random(conditions.device.seed, *self.name.encode())
-        self.plane = self.drawn(random, self._figures, conditions).astype(np.float32)
+    @classmethod
+    @abstractmethod
+    def change(cls, conditions: Conditions, figures: Any, seen: Glimpse) -> Values:
+        """Return how far moments (P) are off, at most."""
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
@@ -50,53 +49,55 @@ class _Fault(Effect):
             return Call(False, "the device has no such fault", 0.0, 0.0)
         still = issubclass(cls, PlaneEffect) and not conditions.moves
         changes = tuple(cls.change(conditions, figures, each) for each in conditions.glimpses)
-        cost_s = 0.0 if still else conditions.pixels * cls.cost_s
+        cost_s = 0.0 if still else conditions.pixels * cls.cost_s_per_pixel
         return weigh(conditions, changes, cls.reason.format(figures), cost_s)
 
 
-def _fault(
-    kind: Any,
-    words: str,
-    change: _Change,
-    drawn: _Drawn = lambda random, figures, of: np.zeros(0),
-    **does: Any,
-) -> type[Effect]:
-    """Make one: name | s a pixel of an image | what it is | why it is built, by its figures."""
-    name, cost_s, what, reason = words.split(" | ")
-    own = {"name": name, "figures": name.replace("-", "_"), "what": what, "reason": reason}
-    of = {"change": staticmethod(change), "drawn": staticmethod(drawn), "cost_s": float(cost_s)}
-    return type(name, (_Fault, kind), {**own, **of, **does, "__module__": __name__})
+class _StrayLight(_Fault, PlaneEffect):
+    """Moves a share of the light, which may then have any phase."""
+
+    local = False
+
+    @staticmethod
+    @abstractmethod
+    def moved(figures: Any, plane: _Plane) -> _Plane:
+        """Return where the light of a plane (H, W) goes."""
+
+    @staticmethod
+    def share(figures: Any) -> float:
+        """Return how much of it goes there."""
+        return float(figures)
+
+    @classmethod
+    def change(cls, conditions: Conditions, figures: Any, seen: Glimpse) -> Values:
+        """Return what comes and what goes."""
+        off = cls.share(figures) * (cls.moved(figures, seen.plane) + seen.plane)
+        return np.asarray(off.ravel())
+
+    def on_light(self, planes: LightPlanes) -> None:
+        """Move it."""
+        planes.move(self.share(self._figures), lambda plane: self.moved(self._figures, plane))
 
 
-def _random(*words: int) -> np.random.Generator:
-    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(words)))
+class LensScatter(_StrayLight):
+    """A share of the light is spread by a wide Gaussian; light that leaves the image is lost."""
 
+    name = "lens-scatter"
+    what = "light goes astray in the lens"
+    figures = "lens_scatter"
+    reason = "{0.share:.1%} of the light goes astray"
+    cost_s_per_pixel = 6e-8
 
-def _moved(words: str, moved: Callable[[Any, NDArray[Any]], NDArray[Any]]) -> type[Effect]:
-    """Make one that moves a share of the light, which may then have any phase."""
+    @staticmethod
+    def share(figures: Scattering) -> float:
+        """Return how much goes astray."""
+        return figures.share
 
-    def on_light(self: Any, planes: LightPlanes) -> None:
-        planes.move(share(self._figures), lambda plane: moved(self._figures, plane))
-
-    def share(of: Any) -> Any:
-        return getattr(of, "share", of)
-
-    def change(_: Conditions, of: Any, seen: Glimpse) -> Values:
-        return np.asarray(share(of) * (moved(of, seen.plane) + seen.plane).ravel())
-
-    return _fault(PlaneEffect, words, change, local=False, on_light=on_light)
-
-
-def _around(_: Any, plane: NDArray[Any]) -> NDArray[Any]:
-    """Return the mean of each pixel's four neighbours; beyond the edges it is its own."""
-    wide = np.pad(plane, 1, mode="edge")
-    four = wide[:-2, 1:-1] + wide[2:, 1:-1] + wide[1:-1, :-2] + wide[1:-1, 2:]
-    return np.asarray(four / 4)
-
-
-def _astray(scatter: Any, plane: NDArray[Any]) -> NDArray[Any]:
-    rows, columns = (_spread(n, scatter.width * plane.shape[1]) for n in plane.shape)
-    return np.asarray(rows @ plane @ columns.T)
+    @staticmethod
+    def moved(figures: Scattering, plane: _Plane) -> _Plane:
+        """Spread it."""
+        rows, columns = (_spread(n, figures.width * plane.shape[1]) for n in plane.shape)
+        return np.asarray(rows @ plane @ columns.T)
 
 
 @lru_cache(maxsize=16)
@@ -110,110 +111,183 @@ def _spread(count: int, sigma: float) -> NDArray[np.float32]:
     return np.asarray(spread, dtype=np.float32)
 
 
-def _strewn(figures: tuple[float, float], seen: Glimpse) -> Values:
-    """Return what a share of the pixels has of something: quantiles of an exponential density."""
-    (share, mean), sizes = figures, np.zeros(seen.brightness.size)
-    count = math.ceil(share * len(sizes))
-    places = np.linspace(0, len(sizes) - 1, count).astype(int)
-    sizes[places] = -mean * np.log((np.arange(count) + 0.5) / count)
-    return sizes
+class Ghost(_StrayLight):
+    """Surfaces of the lens mirror light through its axis."""
+
+    name = "ghost"
+    what = "the lens mirrors light through the middle of the image"
+    figures = "ghost"
+    reason = "{0:.2%} of the light goes to the opposite place"
+    cost_s_per_pixel = 1e-8
+
+    @staticmethod
+    def moved(figures: float, plane: _Plane) -> _Plane:
+        """Turn it by half a turn."""
+        return plane[::-1, ::-1]
 
 
-def _some(random: np.random.Generator, figures: tuple[float, float], of: Conditions) -> Values:
-    share, mean = figures
-    return random.exponential(mean, of.shape) * (random.random(of.shape) < share)
+class Crosstalk(_StrayLight):
+    """Light, or the charge that it makes, crosses to the four neighbours."""
+
+    name = "crosstalk"
+    what = "pixels get light of their neighbours"
+    figures = "crosstalk"
+    reason = "{0:.2%} of a pixel's light goes to its four neighbours"
+    cost_s_per_pixel = 2e-8
+
+    @staticmethod
+    def moved(figures: float, plane: _Plane) -> _Plane:
+        """Take the mean of the neighbours."""
+        return _around(plane)
 
 
-def _unsteady(of: Conditions, figures: tuple[float, float], seen: Glimpse) -> Values:
-    """Return what sums of four images b/2 (1 + cos) with other delays and powers are off by."""
-    delay_s, power = figures
-    turned = 1 - math.exp(-((2 * math.pi * of.highest_hz * delay_s) ** 2) / 2)
-    return math.sqrt((turned + 1.5 * power**2) / of.sequence.takes) * seen.brightness
+def _around(plane: _Plane) -> _Plane:
+    """Return the mean of each pixel's four neighbours; beyond the edges it is its own."""
+    wide = np.pad(plane, 1, mode="edge")
+    four = wide[:-2, 1:-1] + wide[2:, 1:-1] + wide[1:-1, :-2] + wide[1:-1, 2:]
+    return np.asarray(four / 4)
 
 
-def _draw_lamp(self: Any, shot: Shot) -> None:
-    late, more = _random(shot.seed, shot.exposure, 0x0072).standard_normal(2)
-    shot.delay_s += self._figures[0] * late
-    shot.power *= max(0.0, 1 + self._figures[1] * more)
+class Jitter(_Fault, ShotEffect):
+    """Delay and power of the light differ from image to image: the floor of long averages."""
+
+    name = "jitter"
+    what = "no two images get quite the same light"
+    figures = "jitter"
+    reason = "{0[0]:.2g} s and {0[1]:.2%} of the power from image to image"
+    cost_s_per_pixel = 1e-9
+
+    @classmethod
+    def change(cls, conditions: Conditions, figures: _Some, seen: Glimpse) -> Values:
+        """Return what sums of four images b/2 (1 + cos) are off by."""
+        delay_s, power = figures
+        turned = 1 - math.exp(-((2 * math.pi * conditions.highest_hz * delay_s) ** 2) / 2)
+        return math.sqrt((turned + 1.5 * power**2) / conditions.sequence.takes) * seen.brightness
+
+    def on_shot(self, shot: Shot) -> None:
+        """Draw both of an exposure."""
+        late, more = _random(shot.seed, shot.exposure, 0x0072).standard_normal(2)
+        shot.delay_s += self._figures[0] * late
+        shot.power *= max(0.0, 1 + self._figures[1] * more)
 
 
-def _spill(self: Any, exposure: Exposure) -> None:
-    """Spill to the neighbours, and on from there, until nothing is over; the rest is drained."""
-    signal, full = exposure.signal, np.float32(self._sensor.full_well_e)
-    for _ in range(_MOST_SPILLS):
-        if signal.max() <= full:
-            return
-        over = np.maximum(signal - full, 0)
-        signal += np.float32(self._figures) * _around(None, over) - over
-    np.minimum(signal, full, out=signal)
+class _SomePixels(_Fault, ImageEffect):
+    """A share of the pixels has something of exponentially distributed size, by the device's seed.
+
+    ``plane`` (H, W) is that size, for all scenes.
+    """
+
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
+        random, (share, mean) = _random(conditions.device.seed, *self.name.encode()), self._figures
+        sizes = random.exponential(mean, conditions.shape)
+        self.plane = (sizes * (random.random(conditions.shape) < share)).astype(np.float32)
+
+    @classmethod
+    def change(cls, conditions: Conditions, figures: _Some, seen: Glimpse) -> Values:
+        """Strew quantiles of the exponential density over the pixels."""
+        (share, mean), sizes = figures, np.zeros(seen.brightness.size)
+        count = math.ceil(share * len(sizes))
+        places = np.linspace(0, len(sizes) - 1, count).astype(int)
+        sizes[places] = -mean * np.log((np.arange(count) + 0.5) / count)
+        return conditions.per_e * cls.noise_e(conditions, sizes)
+
+    @staticmethod
+    @abstractmethod
+    def noise_e(conditions: Conditions, sizes: Values) -> Values:
+        """Return the noise in electrons of pixels with so much of it."""
 
 
-def _add_noise(self: Any, exposure: Exposure) -> None:
-    exposure.variance_e2 = exposure.variance_e2 + self.plane**2
+class HotPixels(_SomePixels):
+    """Electrons that come without light, in some pixels; they have shot noise, too."""
+
+    name = "hot-pixels"
+    what = "some pixels fill up without light"
+    figures = "hot_pixels"
+    reason = "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons a second"
+    cost_s_per_pixel = 7e-10
+
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
+        self.plane *= np.float32(conditions.sequence.exposure_s)
+
+    @staticmethod
+    def noise_e(conditions: Conditions, sizes: Values) -> Values:
+        """Return their shot noise: four images cancel their mean."""
+        return np.sqrt(conditions.sequence.exposure_s * sizes)
+
+    def apply(self, exposure: Exposure) -> None:
+        """Add them."""
+        exposure.signal += self.plane
 
 
-def _bend(self: Any, exposure: Exposure) -> None:
-    signal, full = exposure.signal, np.float32(self._sensor.full_well_e)
-    np.minimum(signal, full, out=signal)
-    signal -= self._figures / full * signal**2
+class NoisyPixels(_SomePixels):
+    """Further noise of the amplifiers of some pixels."""
+
+    name = "noisy-pixels"
+    what = "some pixels are read with more noise"
+    figures = "noisy_pixels"
+    reason = "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons of further noise"
+    cost_s_per_pixel = 1.7e-9
+    adds_variance = True
+
+    @staticmethod
+    def noise_e(conditions: Conditions, sizes: Values) -> Values:
+        """Return it as it is."""
+        return sizes
+
+    def apply(self, exposure: Exposure) -> None:
+        """Add its variance."""
+        exposure.variance_e2 = exposure.variance_e2 + self.plane**2
 
 
-LensScatter = _moved(
-    "lens-scatter | 6e-8 | light goes astray in the lens | {0.share:.1%} of the light goes astray",
-    _astray,
-)
-Ghost = _moved(
-    "ghost | 1e-8 | the lens mirrors light through the middle of the image | "
-    "{0:.2%} of the light goes to the opposite place",
-    lambda _, plane: plane[::-1, ::-1],
-)
-Crosstalk = _moved(
-    "crosstalk | 2e-8 | pixels get light of their neighbours | "
-    "{0:.2%} of a pixel's light goes to its four neighbours",
-    _around,
-)
-Jitter = _fault(
-    ShotEffect,
-    "jitter | 1e-9 | no two images get quite the same light | "
-    "{0[0]:.2g} s and {0[1]:.2%} of the power from image to image",
-    _unsteady,
-    on_shot=_draw_lamp,
-)
-HotPixels = _fault(
-    ImageEffect,
-    "hot-pixels | 7e-10 | some pixels fill up without light | "
-    "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons a second",
-    lambda of, figures, seen: of.per_e * np.sqrt(of.sequence.exposure_s * _strewn(figures, seen)),
-    lambda random, figures, of: of.sequence.exposure_s * _some(random, figures, of),
-    apply=lambda self, exposure: np.add(exposure.signal, self.plane, out=exposure.signal),
-)
-Blooming = _fault(
-    ImageEffect,
-    "blooming | 4e-8 | full pixels spill charge to their neighbours | "
-    "{0:.1%} of what is beyond a full well goes to the four neighbours",
-    lambda of, share, seen: (
-        share
-        / 4
-        * np.maximum(seen.brightness - (of.sensor.full_well_e - of.white_e) / of.scale_e, 0)
-    ),
-    apply=_spill,
-)
-NoisyPixels = _fault(
-    ImageEffect,
-    "noisy-pixels | 1.7e-9 | some pixels are read with more noise | "
-    "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons of further noise",
-    lambda of, figures, seen: of.per_e * _strewn(figures, seen),
-    _some,
-    adds_variance=True,
-    apply=_add_noise,
-)
-NonLinearity = _fault(
-    ImageEffect,
-    "non-linearity | 3e-9 | what is read lags behind the charge | {0:.2%} less at a full well",
-    # the part with the cosine of the square of b/2 (1 + cos)
-    lambda of, lack, seen: (
-        (seen.brightness * of.scale_e + 2 * of.white_e * seen.reflectance)
-        * (lack * seen.brightness / of.sensor.full_well_e)
-    ),
-    apply=_bend,
-)
+class Blooming(_Fault, ImageEffect):
+    """A share of the charge beyond a full well spills to the four neighbours."""
+
+    name = "blooming"
+    what = "full pixels spill charge to their neighbours"
+    figures = "blooming"
+    reason = "{0:.1%} of what is beyond a full well goes to the four neighbours"
+    cost_s_per_pixel = 4e-8
+
+    @classmethod
+    def change(cls, conditions: Conditions, figures: float, seen: Glimpse) -> Values:
+        """Return what one neighbour gets of a pixel that is over."""
+        full = (conditions.sensor.full_well_e - conditions.white_e) / conditions.scale_e
+        return figures / 4 * np.maximum(seen.brightness - full, 0)
+
+    def apply(self, exposure: Exposure) -> None:
+        """Spill, and on from there, until nothing is over; the rest is drained."""
+        signal, full = exposure.signal, np.float32(self._sensor.full_well_e)
+        for _ in range(_MOST_SPILLS):
+            if signal.max() <= full:
+                return
+            over = np.maximum(signal - full, 0)
+            signal += np.float32(self._figures) * _around(over) - over
+        np.minimum(signal, full, out=signal)
+
+
+class NonLinearity(_Fault, ImageEffect):
+    """What is read lags behind the charge, by its square."""
+
+    name = "non-linearity"
+    what = "what is read lags behind the charge"
+    figures = "non_linearity"
+    reason = "{0:.2%} less at a full well"
+    cost_s_per_pixel = 3e-9
+
+    @classmethod
+    def change(cls, conditions: Conditions, figures: float, seen: Glimpse) -> Values:
+        """Return the part with the cosine of the square of b/2 (1 + cos)."""
+        size_e = seen.brightness * conditions.scale_e + 2 * conditions.white_e * seen.reflectance
+        return size_e * (figures * seen.brightness / conditions.sensor.full_well_e)
+
+    def apply(self, exposure: Exposure) -> None:
+        """Bend it, up to a full well."""
+        signal, full = exposure.signal, np.float32(self._sensor.full_well_e)
+        np.minimum(signal, full, out=signal)
+        signal -= self._figures / full * signal**2
+
+
+def _random(*words: int) -> np.random.Generator:
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(words)))
