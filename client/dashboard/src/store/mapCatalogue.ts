@@ -1,5 +1,6 @@
 import type { ColourMapName } from "../scales/colourMaps";
 import type { ScaleKind } from "../scales/scale";
+import maps from "./maps.json";
 
 /** A map of one number a pixel, and how it is shown unless the user chose otherwise. */
 export interface MapProduct {
@@ -16,30 +17,7 @@ export interface MapProduct {
 }
 
 /** The maps of this project, in the order of their tabs. */
-export const MAP_PRODUCTS: readonly MapProduct[] = [
-  { product: "range", name: "Range", hint: "Distance to what the first light came from", unit: "m", colours: "viridis", decimals: 3 },
-  { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", decimals: 1 },
-  { product: "indirect", name: "Indirect", hint: "Light that took a longer way", unit: "DN", colours: "grey", decimals: 1 },
-  { product: "brightness", name: "Brightness", hint: "All light: the zeroth moment", unit: "DN", colours: "grey", decimals: 1 },
-  {
-    product: "validity",
-    name: "Validity",
-    hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them",
-    unit: "1",
-    colours: "coolwarm",
-    decimals: 4,
-    signed: true,
-  },
-  {
-    product: "range_error",
-    name: "Error",
-    hint: "Half of the 90 % interval of each pixel's range, of noise and bias",
-    unit: "m",
-    colours: "cividis",
-    scale: "logarithmic",
-    decimals: 4,
-  },
-];
+export const MAP_PRODUCTS = maps as readonly MapProduct[];
 
 /** The map of another package's product, by what the service says of it. */
 export function mapOf(product: string, unit: string, hint: string): MapProduct {

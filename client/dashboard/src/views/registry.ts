@@ -5,6 +5,7 @@ import { MapView, SecondMapView } from "./map/MapView";
 import { ResponseView } from "./response/ResponseView";
 import { SequenceView } from "./sequence/SequenceView";
 import { TransientView } from "./transient/TransientView";
+import words from "./words.json";
 
 interface View {
   readonly name: ViewName;
@@ -37,20 +38,4 @@ export const VIEWS: readonly View[] = [
 ];
 
 /** What each shows, with the words that people search for. */
-export const WORDS: Readonly<Record<ViewName, string>> = {
-  map: "One number a pixel: range (distance, depth), direct and indirect light, brightness, errors. Compare shows the difference to a kept frame or a recording; Shift + drag measures a region (roi) with its histogram.",
-  "second-map": "Another map beside the first: direct beside indirect, say.",
-  transient: "Which pixels light reaches at one time of flight: as it comes, what came in the last nanosecond, or all so far.",
-  response: "The light of the selected pixel over time, with bounds, its returns, and the error of its range.",
-  plots: "Values over time (chart) at the selected pixel and the pins, in a region (roi), and along a line (profile).",
-  streak: "Light over time along one row of pixels, as a streak camera shows it.",
-  points: "The ranges as a cloud of points in 3D: turn it, and measure the distance between pins.",
-  validity: "Which pixels have no value (invalid, mask, flags), which not to trust, and why.",
-  sequence: "Exposure, frequency and takes; how accurate ranges are, and what more accuracy costs in time (plan).",
-  series: "Frames at several settings compared in a table: noise, bias, time, accuracy (csv).",
-  recordings: "Frames kept on the service: record, replay, export and download (hdf5).",
-  reconstruction: "How moments become ranges: estimator, neighbours, outliers, frames that stand still.",
-  calibration: "Measures what is the camera's own, so that ranges are right: by a diffuser, or a wall at a known range.",
-  simulation: "The scene before a simulated camera, which effects it calls for, and which it does not.",
-  events: "All notices and faults of this page and the camera, with their times (log, messages).",
-};
+export const WORDS: Readonly<Record<ViewName, string>> = words;
