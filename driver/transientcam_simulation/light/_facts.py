@@ -13,7 +13,7 @@ from transientcam_simulation.effects import Glimpse, Noise, Values
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._further_light import FurtherLight
 from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
-from transientcam_simulation.light._paths import Lit, light_rays
+from transientcam_simulation.light._paths import Lit, camera_of, light_rays
 from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
 from transientcam_simulation.light._recent import Recent
@@ -82,7 +82,7 @@ class SceneFacts:
         self._shape = rows.shape
         self._rows, self._columns = rows.ravel(), columns.ravel()
         self._times_s: tuple[float, ...] = (0.0,)
-        motions = [each for surface in scene.surfaces for each in surface.motions]
+        motions = [*scene.carriers, *(each for of in scene.surfaces for each in of.motions)]
         self._period_s = max((each.period_s for each in motions), default=0.0)
         if scene.moves:
             self._times_s = tuple((k + 0.5) / _TIMES * self._period_s for k in range(_TIMES))
@@ -132,8 +132,8 @@ class SceneFacts:
     @cached_property
     def _sampled(self) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
         scenes = tuple(each.scene for each in self._seen)
-        rays, moves = self._rays(self._camera), self._scene.moves
-        return sampled_glimpses(scenes, rays, self.glimpses, moves=moves)
+        rays = [self._rays(camera_of(scene)) for scene in scenes]
+        return sampled_glimpses(scenes, rays, self.glimpses, moves=self._scene.moves)
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
@@ -150,19 +150,22 @@ class SceneFacts:
     def _changes(
         self, effect: str, frequencies_hz: tuple[float, ...], during_s: float
     ) -> tuple[Values, ...]:
-        surfaces, camera, there = self._scene.surfaces, self._camera, self._seen
+        surfaces, there = self._scene.surfaces, self._seen
+        straight = (
+            replace(k.scene, camera=replace(camera_of(k.scene), lens=PINHOLE)) for k in there
+        )
         variants: dict[str, tuple[bool, Callable[[], list[list[_SampledView]]]]] = {
             "mirror-paths": (
                 bool(self._scene.mirrors),
-                lambda: [[self._look(without_mirrors(each.scene), camera) for each in there]],
+                lambda: [[self._look(without_mirrors(each.scene)) for each in there]],
             ),
             "glass": (
                 bool(self._scene.panes),
-                lambda: [[self._look(without_glass(each.scene), camera) for each in there]],
+                lambda: [[self._look(without_glass(each.scene)) for each in there]],
             ),
             "gloss": (
                 any(each.gloss for each in surfaces),
-                lambda: [[self._look(without_gloss(each.scene), camera) for each in there]],
+                lambda: [[self._look(without_gloss(each.scene)) for each in there]],
             ),
             "scattering": (
                 any(each.scatter for each in surfaces),
@@ -170,11 +173,11 @@ class SceneFacts:
             ),
             "mixed-pixels": (
                 True,
-                lambda: [[self._look(each.scene, camera, self._within) for each in there]],
+                lambda: [[self._look(each.scene, self._within) for each in there]],
             ),
             "distortion": (
-                camera.lens.bends,
-                lambda: [[self._look(each.scene, replace(camera, lens=PINHOLE)) for each in there]],
+                self._camera.lens.bends,
+                lambda: [[self._look(each) for each in straight]],
             ),
         }
         if effect == "motion":  # which depends on the sequence
@@ -226,7 +229,7 @@ class SceneFacts:
         return tuple(part * each for each in changes)
 
     def _later(self, by_s: float) -> list[_SampledView]:
-        return [self._look(self._scene.at(t + by_s), self._camera) for t in self._times_s]
+        return [self._look(self._scene.at(t + by_s)) for t in self._times_s]
 
     @property
     def too_thin(self) -> tuple[str, ...]:
@@ -243,7 +246,6 @@ class SceneFacts:
 
     def _thin(self, pixels: float) -> list[Surface]:
         """Surfaces that may be thinner than so many pixels, seen by camera or light."""
-        apexes = self._camera.position_m, self._scene.light.position_m
         return [
             each
             for k, each in enumerate(self._scene.surfaces)
@@ -253,7 +255,7 @@ class SceneFacts:
                     there.surfaces[k].shape, apex, self._pixel_rad, pixels=pixels, aslant=False
                 )
                 for there in map(self._scene.at, self._times_s)
-                for apex in apexes
+                for apex in (camera_of(there).position_m, there.light.position_m)
             )
         ]
 
@@ -263,26 +265,23 @@ class SceneFacts:
 
     @property
     def pixels_per_s(self) -> float:
-        """Highest speed of any surface, at the place where it stands, in pixels."""
-        speeds = [0.0]
+        """Highest speed of any surface, at the place where it stands, in pixels; or of the view."""
+        speeds, carriers = [0.0], self._scene.carriers
         for each in self._scene.surfaces:
             away_m = np.linalg.norm(each.shape.extent() - self._camera.position_m, axis=-1).min()
-            speed_m_s = sum(motion.speed_m_s for motion in each.motions)
+            speed_m_s = each.speed_m_s + sum(motion.speed_m_s for motion in carriers)
             speeds.append(speed_m_s / (self._pixel_rad * max(float(away_m), 1e-3)))
-        return max(speeds)
+        return max(speeds) + sum(motion.turn_rad_s for motion in carriers) / self._pixel_rad
 
     @cached_property
     def _seen(self) -> list[_SampledView]:
-        return [self._look(self._scene.at(time_s), self._camera) for time_s in self._times_s]
+        return [self._look(self._scene.at(time_s)) for time_s in self._times_s]
 
     def _look(
-        self,
-        scene: Scene,
-        camera: Viewpoint,
-        places: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
+        self, scene: Scene, places: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     ) -> _SampledView:
         """Follow rays through places in the pixels judged, from their centres."""
-        rays = np.concatenate([self._rays(camera, at) for at in places])
+        rays = np.concatenate([self._rays(camera_of(scene), at) for at in places])
         lit, count = light_rays(scene, rays), len(self._rows)
         return _SampledView(
             scene, tuple(lit.part(slice(k, k + count)) for k in range(0, len(rays), count))

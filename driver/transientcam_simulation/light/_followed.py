@@ -12,7 +12,7 @@ from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._graded import graded
 from transientcam_simulation.light._paths import Lit, joined, light_rays
 from transientcam_simulation.light._rays import RAYS, camera_rays, rays_within
-from transientcam_simulation.scene import Scene
+from transientcam_simulation.scene import Points, Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +41,17 @@ class FollowedRays:
     of these rays sees does not.
 
     ``scene``: standing still, with a camera.
+    ``rays``: (H W, 3) through the pixels, if not through their centres.
     """
 
-    def __init__(self, scene: Scene, *, width: int, height: int) -> None:
+    def __init__(self, scene: Scene, rays: Points | None = None, /, *, width: int, height: int):
         assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
         self.scene = scene
         self.width, self.height = width, height
         self._camera = scene.camera
-        self.centres = camera_rays(self._camera, width=width, height=height)
+        self.centres = (
+            camera_rays(self._camera, width=width, height=height) if rays is None else rays
+        )
         self._adding = threading.Lock()
         self._kept: dict[int, Within] = {}
 

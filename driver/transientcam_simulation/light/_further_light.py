@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._patches import Patches
+from transientcam_simulation.light._paths import camera_of
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._variants import still_scene
-from transientcam_simulation.scene import Points, Scene, patch_edges_m
+from transientcam_simulation.scene import Points, Scene, patch_edges_m, speed_m_s
 
 _HELD_PATCHES: Final = 0.25
 """Of the largest patches' edges: that anything moves while what patches give the pixels stands."""
@@ -69,8 +70,9 @@ class FurtherLight:
     @cached_property
     def step_s(self) -> float:
         """Time between solutions."""
-        speeds_m_s = (sum(each.speed_m_s for each in of.motions) for of in self._scene.surfaces)
-        return self._reach_m / max(*speeds_m_s, self._reach_m / _LONGEST_S)
+        lamp, speeds_m_s = self._scene.light, [each.speed_m_s for each in self._scene.surfaces]
+        lamp_m_s = speed_m_s(lamp.motions, camera_of(self._scene).position_m, lamp.position_m)
+        return self._reach_m / max(*speeds_m_s, lamp_m_s, self._reach_m / _LONGEST_S)
 
     @property
     def held_s(self) -> float:
@@ -81,22 +83,27 @@ class FurtherLight:
         """Moments (N) of the light that patches get from each other."""
         step = math.floor(time_s / self.step_s)
         first_s, last_s = step * self.step_s, (step + 1) * self.step_s
-        if np.abs(self._offsets(first_s) - self._offsets(last_s)).max() > 1.01 * self._reach_m:
+        if np.abs(self._places(first_s) - self._places(last_s)).max() > 1.01 * self._reach_m:
             return self.solution(time_s, frequency_hz)  # as a path starts again in between
         later = time_s / self.step_s - step
         one, other = (self.solution(at_s, frequency_hz) for at_s in (first_s, last_s))
         return (1 - later) * one + later * other
 
-    def _offsets(self, time_s: float) -> Points:
-        """How far each surface is from its place, (S, 3)."""
-        return np.array([each.offset_m(time_s) for each in self._scene.surfaces])
+    def _places(self, time_s: float) -> Points:
+        """Places of surfaces' corners and of the lamp."""
+        now = self._scene.at(time_s)
+        return np.vstack([now.light.position_m, *(each.shape.extent() for each in now.surfaces)])
 
     def solution(self, time_s: float, frequency_hz: float) -> NDArray[np.complex128]:
         """Solve it at a time, or find what is kept."""
 
         def exchange() -> tuple[Exchange, int]:
-            patches = self.patches.moved(self._offsets(time_s))
-            between = Exchange.between(self._scene.at(time_s), patches)
+            scene, surfaces = self._scene.at(time_s), self._scene.surfaces
+            patches = self.patches.moved(np.array([each.offset_m(time_s) for each in surfaces]))
+            if any(each.turns for each in surfaces):
+                cuts = {k: (of.up, of.along) for k, of in patches.cells.items()}
+                patches = Patches.cut(scene, cuts)
+            between = Exchange.between(scene, patches)
             return between, between.bounces(self._tolerance)
 
         def solve() -> NDArray[np.complex128]:

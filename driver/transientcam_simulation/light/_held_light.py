@@ -109,7 +109,7 @@ class HeldLight:
         delay_s = ends.distance_m.astype(np.float64) / SPEED_OF_LIGHT_M_S
         phase_rad = compiled_light.phases(delay_s, 2 * np.pi * frequency_hz)
         compiled_gathered.sent(on, lit.reflectance, np.cos(phase_rad), np.sin(phase_rad))
-        scatter = scatter_of(ends.still, ends.index)
+        scatter = scatter_of(ends.scene, ends.index)
         return moments if scatter is None else moments * scatter.transfer(frequency_hz)
 
     def _of_patches(self, frequency_hz: float) -> NDArray[np.complex64]:

@@ -80,7 +80,6 @@ class Way:
 class Ends:
     """Points on surfaces that rays of the camera end on.
 
-    ``still``: what stands still, for its light.
     ``surfaces``, ``index``: all surfaces, and which one each point lies on; points of one follow
     each other.
     ``point``: components of the points.
@@ -90,7 +89,7 @@ class Ends:
     ``boxes``: (S, 2, 3) lowest and highest coordinates of all surfaces.
     """
 
-    still: Scene
+    scene: Scene
     surfaces: tuple[Surface, ...]
     index: NDArray[np.int32]
     point: tuple[Plane, Plane, Plane]
@@ -161,7 +160,7 @@ class Ends:
         every = np.arange(len(facing))
         albedo = np.array([surface.reflectivity for surface in self.surfaces])[index]
         ends = RayEnds(every, point, index, distance_m, facing, direction, up, albedo)
-        return highlight(self.still, light, ends)
+        return highlight(self.scene, light, ends)
 
     def _irradiance(
         self, light: ImageLight, normal: tuple[Plane, Plane, Plane], on: NDArray[np.intp]
@@ -171,8 +170,8 @@ class Ends:
         axis = light.axis.astype(np.float32)
         ways = lamp, axis, *self.point, *normal, on
         length_m, irradiance, cosine = compiled_light.received(*ways)
-        if self.still.light.beam_exponent:
-            irradiance *= beam(self.still.light, cosine).astype(np.float32, copy=False)
+        if self.scene.light.beam_exponent:
+            irradiance *= beam(self.scene.light, cosine).astype(np.float32, copy=False)
         return length_m, irradiance
 
     def _clear(

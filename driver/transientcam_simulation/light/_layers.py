@@ -124,7 +124,8 @@ class MovingResponses:
 
     def unchanged(self, frequency_hz: float) -> Moments:
         """Moments (H, W) of what stands still."""
-        return (self.held or self._still).moments(frequency_hz)
+        stands = self._still.lit.surface.max() >= 0  # else it is dark
+        return (self.held if self.held and stands else self._still).moments(frequency_hz)
 
     def differing(self, frequency_hz: float) -> Moments:
         """Moments of the region that differs."""

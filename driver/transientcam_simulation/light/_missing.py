@@ -163,12 +163,14 @@ class SampledWays:
 
 
 def sampled_glimpses(
-    scenes: tuple[Scene, ...], rays: Points, seen: tuple[Glimpse, ...], *, moves: bool
+    scenes: tuple[Scene, ...], rays: list[Points], seen: tuple[Glimpse, ...], *, moves: bool
 ) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
     """Sample scenes at some times: of the pixels judged then, by their rays, a few drawn once."""
-    count = min(len(rays), PIXELS // len(seen))
-    some = np.sort(np.random.default_rng(1).choice(len(rays), count, replace=False))
-    ways = tuple(SampledWays.of(scene, rays[some], moves=moves) for scene in scenes)
+    count = min(len(rays[0]), PIXELS // len(seen))
+    some = np.sort(np.random.default_rng(1).choice(len(rays[0]), count, replace=False))
+    ways = tuple(
+        SampledWays.of(scene, of[some], moves=moves) for scene, of in zip(scenes, rays, strict=True)
+    )
     parts = zip((each.brightness[some] for each in seen), ways, strict=True)
     bright = [direct + each.followed for direct, each in parts]
     return ways, tuple(

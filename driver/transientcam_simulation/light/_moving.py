@@ -136,7 +136,7 @@ class MovingLight:
         share, at_m, *components = lines
         region = union([each.region for each in visible])
         lit = Ends(
-            self.still.scene,
+            scene,
             scene.surfaces,
             np.repeat(np.array([each.index for each in visible], np.int32), counts),
             (components[0], components[1], components[2]),

@@ -162,7 +162,7 @@ def light_rays(scene: Scene, directions: Points) -> Lit:
     parted = (3 if len(scene.mirrors) == 2 else _MOST_ENDS) if scene.panes else 1
 
     def follow(rays: Points) -> Lit:
-        ends = first_scattering(scene, _camera(scene).position_m, rays)
+        ends = first_scattering(scene, camera_of(scene).position_m, rays)
         return light_on_ends(scene, lights, ends, rays=len(rays), parted=parted)
 
     blocks = [directions[k : k + _BLOCK] for k in range(0, len(directions), _BLOCK)]
@@ -243,7 +243,8 @@ def highlight(scene: Scene, light: ImageLight, ends: RayEnds) -> NDArray[np.floa
     return lobe
 
 
-def _camera(scene: Scene) -> Viewpoint:
+def camera_of(scene: Scene) -> Viewpoint:
+    """Return the camera that a scene of surfaces has."""
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
     return scene.camera
 

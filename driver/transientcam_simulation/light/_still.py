@@ -69,7 +69,11 @@ class StillLight:
         """Pixels, by index, that are the mean over several rays."""
         if noise is not None:
             thin = self._thinly_crossed()
-            self.mixed = np.flatnonzero(self._differs(noise, highest_hz) | thin)
+            scatter, shape = self.lit.scatter(scene), (height, width)
+            planes = [self.lit.moments(f, scatter).reshape(shape) for f in (0.0, highest_hz)]
+            deviation = noise.deviation(self.lit.weight.sum(axis=0), self.lit.shown).reshape(shape)
+            differs = differing(planes, self.lit.surface.reshape(shape), deviation)
+            self.mixed = np.flatnonzero(differs | thin)
             if thin.any() and self._holds_thin():
                 self._rays_a_pixel = RAYS_AT_THIN
         self._noise, self._highest_hz = noise, highest_hz
@@ -209,7 +213,8 @@ class StillLight:
         follow = [(0, np.arange(len(self.rays)), eye, start, self.rays, everywhere, 1.0)]
         while follow:
             bounces, index, apex, start, direction, fills, throughput = follow.pop(0)
-            hits = np.stack([hit(each, start, start + FAR_M * direction) for each in surfaces])
+            ends = start + FAR_M * direction
+            hits = np.array([hit(each, start, ends) for each in surfaces] or [ends[:, 0] + np.inf])
             nearest, which = hits.min(axis=0), hits.argmin(axis=0)
             reach_m = np.minimum(nearest, 1.0) * FAR_M
             way, near, far = np.zeros((len(self.rays), 3)), *np.zeros((2, len(self.rays)))
@@ -278,28 +283,25 @@ class StillLight:
                 marked |= crossed(shape, bundle, counts)
         return marked.ravel()
 
-    def _differs(self, noise: Noise, highest_hz: float) -> NDArray[np.bool_]:
-        """Pixels in which light may differ, (H W): where it does between neighbours.
 
-        By the second difference over three pixels, which even a steep but smooth change hardly
-        has; or where the surface changes, since light over further surfaces changes there too.
-        """
-        shape = self.height, self.width
-        deviation = noise.deviation(self.lit.weight.sum(axis=0), self.lit.shown)
-        limit = _DIFFERS_ABOVE * deviation.reshape(shape)
-        scatter = self.lit.scatter(self.scene)
-        planes = [self.lit.moments(f, scatter).reshape(shape) for f in (0.0, highest_hz)]
-        surface = self.lit.surface.reshape(shape)
-        differs = np.zeros(shape, dtype=bool)
-        for axis in (0, 1):
-            of, other = np.moveaxis(differs, axis, 0), np.moveaxis(surface, axis, 0)
-            step = other[1:] != other[:-1]
-            of[1:] |= step
-            of[:-1] |= step
-            for plane in planes:
-                bend = np.abs(np.diff(np.moveaxis(plane, axis, 0), 2, axis=0))
-                of[1:-1] |= bend > np.moveaxis(limit, axis, 0)[1:-1]
-        return grown(differs).ravel()
+def differing(
+    planes: list[NDArray[np.complex128]], surface: NDArray[np.intp], noise: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Pixels in which light may differ, (H W): where planes of it do between neighbours.
+
+    By the second difference over three pixels, which even a steep but smooth change hardly has; or
+    where the surface changes, since light over further surfaces changes there too.
+    """
+    limit, differs = _DIFFERS_ABOVE * noise, np.zeros(surface.shape, dtype=bool)
+    for axis in (0, 1):
+        of, other = np.moveaxis(differs, axis, 0), np.moveaxis(surface, axis, 0)
+        step = other[1:] != other[:-1]
+        of[1:] |= step
+        of[:-1] |= step
+        for plane in planes:
+            bend = np.abs(np.diff(np.moveaxis(plane, axis, 0), 2, axis=0))
+            of[1:-1] |= bend > np.moveaxis(limit, axis, 0)[1:-1]
+    return grown(differs).ravel()
 
 
 def _affordable(count: int, pixels: int) -> int:

@@ -12,7 +12,7 @@ from transientcam_simulation.light import _compiled_light as compiled_light
 from transientcam_simulation.light._bundle import Region, numbers, union
 from transientcam_simulation.light._coverage import single
 from transientcam_simulation.light._layers import MovingResponses
-from transientcam_simulation.scene import Motion, Scene
+from transientcam_simulation.scene import Scene, Surface
 
 _PIXELS = 0.5
 """That the fastest surface moves from one time to the next, at most. In between, light is
@@ -80,19 +80,20 @@ class Steps:
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """The motions of a surface, and how far it may move within a step."""
+    """A surface that moves, and how far it may within a step."""
 
-    motions: tuple[Motion, ...]
+    surface: Surface
     most_m: float
 
     @property
     def step_s(self) -> float:
         """Longest step at its highest speed."""
-        return self.most_m / sum(motion.speed_m_s for motion in self.motions)
+        return self.most_m / self.surface.speed_m_s
 
     def farthest(self, times_s: list[float]) -> float:
         """Longest way between successive times, over the one that is allowed."""
-        places = np.array([sum(m.offset_m(t) for m in self.motions) for t in times_s])
+        of = self.surface
+        places = [of.at(t).shape.extent() if of.turns else of.offset_m(t) for t in times_s]
         return float(np.linalg.norm(np.diff(places, axis=0), axis=-1).max() / self.most_m)
 
 
@@ -132,13 +133,13 @@ class Between:
 def _paths(scene: Scene, pixel_rad: float) -> tuple[_Path, ...]:
     """Return the paths of moving surfaces; of those with the same motions the closest one's."""
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
-    most_m: dict[tuple[int, ...], _Path] = {}
+    most_m: dict[tuple[float, ...], _Path] = {}
     for surface in scene.surfaces:
-        if not sum(motion.speed_m_s for motion in surface.motions):
+        if not surface.speed_m_s:
             continue
         away_m = np.linalg.norm(surface.shape.extent() - scene.camera.position_m, axis=-1)
-        path = _Path(surface.motions, _PIXELS * pixel_rad * max(float(away_m.min()), 1e-3))
-        same = tuple(id(motion) for motion in surface.motions)
+        path = _Path(surface, _PIXELS * pixel_rad * max(float(away_m.min()), 1e-3))
+        same = surface.speed_m_s, *(id(motion) for motion in surface.motions)
         if same not in most_m or path.most_m < most_m[same].most_m:
             most_m[same] = path
     return tuple(most_m.values())

@@ -28,7 +28,7 @@ from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
 from transientcam_simulation.light._followed import FollowedRays, Within
 from transientcam_simulation.light._further_light import FurtherLight
-from transientcam_simulation.light._paths import Lit, first_hit, light_rays
+from transientcam_simulation.light._paths import Lit, camera_of, first_hit, light_rays
 from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.light._recent import Recent
@@ -231,10 +231,11 @@ class SurfaceScenery:
             (effects - {MixedPixels.name}, wanted.lens),
             lambda: FollowedRays(still_scene(scene), **self._size),
         )
+        noise = wanted.noise if MixedPixels.name in effects else None
         still = StillLight(
             followed.scene,
             **self._size,
-            noise=wanted.noise if MixedPixels.name in effects else None,
+            noise=noise,
             highest_hz=wanted.highest_hz,
             followed=followed,
         )
@@ -265,9 +266,11 @@ class SurfaceScenery:
         load_compiled()
         from transientcam_simulation.light._held_light import HeldLight, held_light
         from transientcam_simulation.light._moving import MovingLight
+        from transientcam_simulation.light._roaming import RoamingLight
         from transientcam_simulation.light._time_interpolation import Steps
 
-        moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
+        roaming = RoamingLight(scene, self._size, noise, wanted.highest_hz)
+        moving = MovingLight(scene, still, soft=noise is not None)
 
         def nothing(_time_s: float) -> None:
             return None
@@ -290,13 +293,15 @@ class SurfaceScenery:
 
         @lru_cache(maxsize=1)
         def at(time_s: float) -> View:
+            if scene.carriers:
+                return View(*roaming.at(time_s, held(time_s)))
             now = steps.at(time_s)
             planes = now.moments, lambda: now.reflectance
             return View(*planes, now.region, now.moments_in, background(now.held))
 
         @lru_cache(maxsize=1)
         def exact(time_s: float) -> Responses:
-            now = moving.at(time_s)
+            now = (roaming.centres if scene.carriers else moving.at)(time_s)
             if not further:
                 return now
             width, height = still.width, still.height
@@ -307,7 +312,8 @@ class SurfaceScenery:
 
         def seen_then(time_s: float) -> SurfaceSeen:
             now, brightness = scene.at(time_s), exact(time_s).moments(0.0).real
-            return surface_seen(now, still.rays, light_rays(now, still.rays), (), brightness)
+            rays = camera_rays(camera_of(now), **self._size)
+            return surface_seen(now, rays, light_rays(now, rays), (), brightness)
 
         return Views(at, exact, seen_then)
 

@@ -20,7 +20,7 @@ from transientcam_simulation.scene._geometry import (
 )
 from transientcam_simulation.scene._limits import most_patches, patch_edges_m, patches_of
 from transientcam_simulation.scene._mesh import Mesh
-from transientcam_simulation.scene._motion import Motion
+from transientcam_simulation.scene._motion import Motion, speed_m_s
 from transientcam_simulation.scene._scene import (
     Background,
     Diffuser,

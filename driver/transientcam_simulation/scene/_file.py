@@ -26,11 +26,11 @@ from transientcam_simulation.base import (
     Waveform,
 )
 from transientcam_simulation.effects import CHOICES, EFFECTS
-from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle
+from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle, rotation
 from transientcam_simulation.scene._limits import require_modest
 from transientcam_simulation.scene._mesh import Mesh
 from transientcam_simulation.scene._mesh_file import load_mesh
-from transientcam_simulation.scene._motion import Motion, Repeat
+from transientcam_simulation.scene._motion import NOWHERE, STANDS, Motion, Repeat
 from transientcam_simulation.scene._scene import (
     Background,
     Diffuser,
@@ -112,17 +112,14 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
     if sum(map(bool, (responses, surfaces, diffuser))) != 1:
         allowed = "given, or [[response]] or [diffuser] instead, but only one of them"
         raise top.error("surface", len(surfaces), allowed)
-    kinds = [surface.kind for surface in surfaces]
-    if "glass" in kinds and any(surface.motions for surface in surfaces):
-        raise top.error(f"surface[{kinds.index('glass')}].kind", "glass", "none if something moves")
     scene = Scene(
         name=name,
         description=description,
         file=file,
-        light=_light(top.table("light"), somewhere=bool(surfaces)),
+        light=_light(top.table("light"), motions, somewhere=bool(surfaces)),
         sensor=_sensor(top.table("sensor")),
         device=_device(top.table("device"), folder),
-        camera=_viewpoint(top.table("camera")) if surfaces else None,
+        camera=_viewpoint(top.table("camera"), motions) if surfaces else None,
         surfaces=tuple(part for surface in surfaces for part in (surface, *_dust(surface))),
         transport=_transport(top.table("transport")),
         responses=responses,
@@ -131,7 +128,14 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
         effects=_effects(top.table("effects")),
         seed=top.integer("seed", 1, least=0, most=2**63 - 1),
     )
-    return top.done(scene)
+    for index, each in enumerate(scene.surfaces):
+        if each.glass and scene.moves:
+            raise top.error(f"surface[{index}].kind", "glass", "none if something moves")
+        if isinstance(each.shape, Mesh) and scene.carriers:
+            raise top.error(f"surface[{index}].shape", "mesh", "none if camera or light moves")
+    anew = (STANDS,) if scene.carriers else ()
+    movable = (replace(k, motions=k.motions + anew) if k.scatters else k for k in scene.surfaces)
+    return top.done(replace(scene, surfaces=tuple(movable)))
 
 
 def _open(path: Path) -> Table:
@@ -144,7 +148,7 @@ def _open(path: Path) -> Table:
     return Table(path, "", content)
 
 
-def _light(table: Table, *, somewhere: bool) -> Light:
+def _light(table: Table, motions: dict[str, Motion], *, somewhere: bool) -> Light:
     electrons_per_s = table.number("electrons_per_s", least=LEAST_E, most=MOST_E)
     if not somewhere:
         return table.done(Light(electrons_per_s, np.zeros(3), np.zeros(3), 0.0))
@@ -153,18 +157,20 @@ def _light(table: Table, *, somewhere: bool) -> Light:
         position_m=table.vector("position_m"),
         aim_at_m=table.vector("aim_at_m"),
         beam_exponent=table.number("beam_exponent", 0.0, least=0, most=1e4),
+        motions=_moves(table, "camera or lamp", motions),
     )
     if np.array_equal(light.aim_at_m, light.position_m):
         raise table.error("aim_at_m", light.aim_at_m.tolist(), "away from position_m")
     return table.done(light)
 
 
-def _viewpoint(table: Table) -> Viewpoint:
+def _viewpoint(table: Table, motions: dict[str, Motion]) -> Viewpoint:
     view = Viewpoint(
         position_m=table.vector("position_m", (0.0, 0.0, 0.0)),
         look_at_m=table.vector("look_at_m", (0.0, 1.0, 0.0)),
         field_of_view_deg=table.number("field_of_view_deg", 45.0, above=0, most=170),
         lens=_lens(table.table("lens")),
+        motions=_moves(table, "camera or lamp", motions),
     )
     if not np.any((view.look_at_m - view.position_m)[:2]):
         allowed = "away from position_m, and not straight above or below it"
@@ -312,13 +318,16 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
         name = table.text("name")
         if name in motions:
             raise table.error("name", name, "a name that no other motion has")
+        stays = NOWHERE.tolist()
         motion = motions[name] = Motion(
-            path_m=table.vectors("path_m", least=2),
+            path_m=table.vectors("path_m", stays if "rotation_deg" in table else None, least=2),
             period_s=table.number("period_s", least=1e-6, most=1e9),
             repeat=table.choice("repeat", get_args(Repeat), "restart"),
+            rotation_deg=table.vectors("rotation_deg", stays, least=2),
         )
-        if motion.speed_m_s > SPEED_OF_LIGHT_M_S:
-            longer = motion.period_s * motion.speed_m_s / SPEED_OF_LIGHT_M_S
+        speed_m_s = motion.speed_m_s + motion.turn_rad_s  # at 1 m from its centre
+        if speed_m_s > SPEED_OF_LIGHT_M_S:
+            longer = motion.period_s * speed_m_s / SPEED_OF_LIGHT_M_S
             limit = f"of at least {longer:.3g}, or path_m is faster than light"
             raise table.error("period_s", motion.period_s, limit)
         table.done(motions)
@@ -339,12 +348,15 @@ def _surface(table: Table, motions: dict[str, Motion], folder: Path | None) -> S
         0.0 if kind == "stencil" else table.number(share, albedo, least=0, most=1),
         _mask(table) if kind == "stencil" else None,
         _scatter(table) if kind == "translucent" else None,
-        _moves(table, moves, motions) if "motion" in table else (),
+        _moves(table, moves, motions),
         gloss,
         exponent,
     )
     if kind == "glass":
         surface = replace(surface, glass=_glass(table, dust=surface.reflectivity))
+    if surface.turns and isinstance(shape, Ellipsoid) and len(set(shape.radii)) > 1:
+        limit = "equal where motion has rotation_deg: axes of an ellipsoid stay along x, y and z"
+        raise table.error("radii_m", shape.radii.tolist(), limit)
     if surface.reflectivity + gloss > 1 and surface.scatters:
         limit = f"at most {1 - surface.reflectivity:g}, what albedo leaves of the light"
         raise table.error("gloss", gloss, limit)
@@ -373,12 +385,8 @@ def _shape(table: Table, kind: Kind, folder: Path | None) -> tuple[Shape, float 
 def _mesh(table: Table, folder: Path | None) -> tuple[Mesh, float | None]:
     mesh, coloured = load_mesh(_file(table, "file", folder), smooth=table.switch("smooth", True))
     scale = table.number("scale", 1.0, least=1e-9, most=1e9)
-    turn, position_m = np.eye(3), table.vector("position_m", (0.0, 0.0, 0.0))
-    angles_deg = table.vector("rotation_deg", (0.0, 0.0, 0.0))
-    for axis, angle_rad in zip(np.eye(3), np.radians(angles_deg), strict=True):
-        cross = np.cross(axis, np.eye(3)).T  # Rodrigues' formula
-        about = np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
-        turn = turn + about @ turn
+    position_m = table.vector("position_m", (0.0, 0.0, 0.0))
+    turn = rotation(table.vector("rotation_deg", (0.0, 0.0, 0.0)))
     mesh = mesh.placed(scale * turn, position_m)
     farthest_m = float(np.abs(mesh.extent()).max())
     if farthest_m > MOST_M:
@@ -418,9 +426,9 @@ def _scatter(table: Table) -> Scatter:
 
 
 def _moves(table: Table, kind: str, motions: dict[str, Motion]) -> tuple[Motion, ...]:
-    if kind not in ("diffuse", "translucent"):
-        raise table.error("motion", table.words("motion"), f"absent; a {kind} stays in its place")
-    names = table.words("motion")
+    names = table.words("motion") if "motion" in table else []
+    if names and kind in ("mirror", "stencil", "glass", "mesh"):
+        raise table.error("motion", names, f"absent; a {kind} stays in its place")
     for name in names:
         if name not in motions:
             known = ", ".join(motions) or "none in this file"

@@ -19,6 +19,16 @@ _CLEAR = 1e-9  # fraction of a segment that counts as its end
 _CLEAR_OF_CURVED = 1e-6  # the same where a root of a quadratic says where the segment starts
 
 
+def rotation(angles_deg: Points) -> Points:
+    """Return the matrix (3, 3) of a turn about x, then y, then z."""
+    turn = np.eye(3)
+    for axis, angle_rad in zip(np.eye(3), np.radians(angles_deg), strict=True):
+        cross = np.cross(axis, np.eye(3)).T  # Rodrigues' formula
+        about = np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
+        turn = turn + about @ turn
+    return turn
+
+
 @dataclass(frozen=True, slots=True)
 class Cells:
     """A shape cut into a grid of flat patches, row by row.
@@ -91,6 +101,10 @@ class Rectangle:
     def moved(self, by: Points) -> "Rectangle":
         """Return it moved."""
         return replace(self, centre=self.centre + by)
+
+    def turned_by(self, turn: Points) -> "Rectangle":
+        """Return it turned by a matrix (3, 3) about its centre."""
+        return replace(self, normal=turn @ self.normal, right=turn @ self.right, up=turn @ self.up)
 
     def turned(self) -> "Rectangle":
         """Return it with its front where its back is."""

@@ -36,7 +36,7 @@ def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, 
         if each.scatters and not isinstance(each.shape, Mesh)
     }
     longest_m = max(sides_m.values(), default=0.0)
-    counts = {k: max(per_side, moving if scene.surfaces[k].motions else 0) for k in sides_m}
+    counts = {k: max(per_side, moving if scene.surfaces[k].speed_m_s else 0) for k in sides_m}
     return {k: min(longest_m / counts[k], m / _LEAST_PER_SIDE) for k, m in sides_m.items()}
 
 

@@ -15,7 +15,7 @@ from transientcam_driver.camera import Lens as RealLens, Sensor
 from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens, Scatter
 from transientcam_simulation.scene._geometry import Points, Primitive, Rectangle
 from transientcam_simulation.scene._mesh import Mesh
-from transientcam_simulation.scene._motion import Motion
+from transientcam_simulation.scene._motion import Motion, carried, speed_m_s
 
 Background = Literal["none", "median"]
 TimeZero = Literal["start", "peak"]
@@ -31,15 +31,25 @@ class Viewpoint:
     look_at_m: Points
     field_of_view_deg: float
     lens: Lens = PINHOLE
+    motions: tuple[Motion, ...] = ()
+    up: Points = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     @property
     def axes(self) -> Points:
         """Unit vectors (3, 3) to the right, downwards, and where the camera looks."""
         forward = self.look_at_m - self.position_m
         forward = forward / np.linalg.norm(forward)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right = np.cross(forward, self.up)
         right /= np.linalg.norm(right)
         return np.stack([right, np.cross(forward, right), forward])
+
+    def at(self, time_s: float) -> "Viewpoint":
+        """Return it where it stands and looks at a time."""
+        points = np.array([self.position_m, self.look_at_m, self.position_m + self.up])
+        place_m, look_at_m, above_m = carried(self.motions, time_s, self.position_m, points)
+        return replace(
+            self, position_m=place_m, look_at_m=look_at_m, up=above_m - place_m, motions=()
+        )
 
     def as_lens(self, light_m: Points, *, width: int, height: int) -> RealLens:
         """Return what a camera would report of this lens, and of a light at ``light_m``."""
@@ -65,13 +75,20 @@ class Light:
 
     Its intensity falls off with the ``beam_exponent``-th power of the cosine to the direction it
     is aimed in. ``electrons_per_s`` is what a white surface that faces it on its axis at 1 m
-    gives a pixel.
+    gives a pixel. What turns it does so about the camera, on which it rides.
     """
 
     electrons_per_s: float
     position_m: Points
     aim_at_m: Points
     beam_exponent: float
+    motions: tuple[Motion, ...] = ()
+
+    def at(self, time_s: float, camera_m: Points) -> "Light":
+        """Return it at its place at a time, given where the camera stands without motion."""
+        points = np.array([self.position_m, self.aim_at_m])
+        position_m, aim_at_m = carried(self.motions, time_s, camera_m, points)
+        return replace(self, position_m=position_m, aim_at_m=aim_at_m, motions=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +162,17 @@ class Surface:
         """Whether light goes on behind it."""
         return self.kind in ("glass", "dust")
 
+    @property
+    def speed_m_s(self) -> float:
+        """Highest speed of any of its points."""
+        corners = self.shape.extent()
+        return speed_m_s(self.motions, corners.mean(axis=0), corners)
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns."""
+        return any(motion.rotation_deg.any() for motion in self.motions)
+
     def offset_m(self, time_s: float) -> Points:
         """Return how far it has moved at a time."""
         return sum((motion.offset_m(time_s) for motion in self.motions), np.zeros(3))
@@ -153,7 +181,11 @@ class Surface:
         """Return it at its place at a time."""
         if not self.motions:
             return self
-        return replace(self, shape=self.primitive.moved(self.offset_m(time_s)), motions=())
+        shape = self.primitive.moved(self.offset_m(time_s))
+        if self.turns and isinstance(shape, Rectangle):  # a sphere stays as it is
+            for motion in self.motions:
+                shape = shape.turned_by(motion.turn(time_s))
+        return replace(self, shape=shape, motions=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,9 +268,18 @@ class Scene:
     @property
     def moves(self) -> bool:
         """Whether anything in it moves."""
-        return any(surface.motions for surface in self.surfaces)
+        return bool(self.carriers) or any(surface.motions for surface in self.surfaces)
+
+    @property
+    def carriers(self) -> tuple[Motion, ...]:
+        """What moves the camera or the lamp, once each: all light changes if there is any."""
+        of_camera = self.camera.motions if self.camera else ()
+        return (*of_camera, *(each for each in self.light.motions if each not in of_camera))
 
     def at(self, time_s: float) -> "Scene":
         """Return the scene as it is at a time of the device."""
         surfaces = tuple(surface.at(time_s) for surface in self.surfaces)
-        return replace(self, surfaces=surfaces) if self.moves else self
+        if self.camera is None or not self.carriers:
+            return replace(self, surfaces=surfaces) if self.moves else self
+        camera, light = self.camera.at(time_s), self.light.at(time_s, self.camera.position_m)
+        return replace(self, surfaces=surfaces, camera=camera, light=light)

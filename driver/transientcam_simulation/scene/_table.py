@@ -94,9 +94,9 @@ class Table:
         """Read a place or a direction: three numbers in m, of at most `MOST_M`."""
         return self._place(key, self._take(key, default), f"a list of 3 numbers{_WITHIN}")
 
-    def vectors(self, key: str, *, least: int) -> NDArray[np.float64]:
+    def vectors(self, key: str, default: Any = None, *, least: int) -> NDArray[np.float64]:
         """Read a list of at least so many places."""
-        value = self._take(key, None)
+        value = self._take(key, default)
         allowed = f"a list of at least {least} lists of 3 numbers{_WITHIN}"
         if not isinstance(value, list) or len(value) < least:
             raise self.error(key, value, allowed)

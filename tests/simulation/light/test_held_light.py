@@ -231,3 +231,29 @@ def test_the_cost_that_is_stated_is_that_of_the_work_that_is_done(
     work_s = pairs * PAIR_S + solved * TURNED_S + gathered * STILL_S
     moving_s = 0.1 * 2 * WIDTH * HEIGHT * MOVING_S  # the ball covers about a tenth of the image
     assert images * call.cost_s / 2 < work_s + images * moving_s < images * call.cost_s * 2
+
+
+def test_light_between_surfaces_follows_one_that_turns() -> None:
+    of = scene()
+    door = Rectangle.facing(v(0.3, 1.5, 0), v(0, -1, 0), size=(0.5, 0.8))
+    opens = Motion(np.zeros((2, 3)), 2.0, rotation_deg=v(0, 0, 0, 0, 0, -120).reshape(2, 3))
+    door_of = replace(of.surfaces[1], name="door", shape=door, motions=(opens,))
+    of = replace(of, surfaces=(of.surfaces[0], door_of, of.surfaces[2]))
+    light = FurtherLight(of, per_side=6)
+
+    found = light.solution(1.4, 23e6)
+
+    there = of.at(1.4)
+    turned = Rectangle.facing(
+        door.centre, v(-np.sin(np.radians(84)), -np.cos(np.radians(84)), 0), size=(0.5, 0.8)
+    )
+    body = replace(there.surfaces[1], shape=turned)
+    still = replace(there, surfaces=(there.surfaces[0], body, there.surfaces[2]))
+    cuts = {k: (cells.up, cells.along) for k, cells in light.patches.cells.items()}
+    between = Exchange.between(still, Patches.cut(still, cuts))
+    expected = between.irradiance(23e6, between.bounces(1e-4))
+    assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    shut = light.solution(0.0, 23e6)
+    assert np.abs(found - shut).max() > 0.1 * np.abs(shut).max()
+    # a corner, 0.47 m from the middle, never moves by more than an allowed step of patches
+    assert light.step_s < 0.5 * 2.0 / np.radians(120) / 0.47

@@ -69,6 +69,12 @@ normal = [0, -1, 0]
 size_m = [1, 1]
 """
 
+RIDES = MOVED[: MOVED.index("[[surface]]")]
+FAST = RIDES.replace("period_s = 2", "period_s = 1e-6\nrotation_deg = [[0, 0, 0], [0, 0, 9e5]]")
+NONE, SPUN = (RIDES.replace("path_m", key) for key in ("path", "rotation_deg"))
+FLAT = SPUN.replace("1, 0, 0", "1, 0")
+EGG = 'shape = "ellipsoid"\nradii_m = [1, 1, 2]\nalbedo = 0.5' + SPUN
+
 ERRORS = [
     ("albedo = 0.5", "albedo = 1.5", "surface[0].albedo", 1.5, "at most 1"),
     ("albedo = 0.5", "", "surface[0].albedo", None, "present"),
@@ -82,6 +88,13 @@ ERRORS = [
     ('"diffuse"', '"glass"\ngloss = 0.1', "surface[0].gloss", 0.1, "known here are"),
     ('"diffuse"', '"glass"\nmotion = "to"', "surface[0].motion", ["to"], "a glass stays"),
     ("albedo = 0.5", "albedo = 0.5" + MOVED, "surface[1].kind", "glass", "something moves"),
+    ("[light]", "[camera]" + MOVED + "albedo = 0.1\n[light]", "surface[0].kind", "glass", "moves"),
+    ("[light]", "[camera]\nmotion = 'to'\n[light]", "camera.motion", "to", "none in this file"),
+    ("[light]", "[light]\nmotion = 'to'", "light.motion", "to", "name of a [[motion]]"),
+    ("albedo = 0.5", "albedo = 0.5" + FAST, "motion[0].period_s", 1e-6, "faster than light"),
+    ("albedo = 0.5", "albedo = 0.5" + NONE, "motion[0].path_m", None, "present"),
+    ("albedo = 0.5", "albedo = 0.5" + FLAT, "motion[0].rotation_deg", None, "3 numbers"),
+    (SCENE[SCENE.index("normal") :], EGG, "surface[0].radii_m", [1, 1, 2], "along x, y and z"),
     ("[0, -1, 0]", "[0, 0, 0]", "surface[0].normal", [0, 0, 0], "other than zero"),
     ("[0, -1, 0]", "[0, -1]", "surface[0].normal", [0, -1], "a list of 3 numbers"),
     ("[0, -1, 0]", "[0, nan, 0]", "surface[0].normal", None, "a list of 3 numbers"),
