@@ -1,8 +1,10 @@
 """Capture time against accuracy: one sequence on a scene, compared with the scene's truth."""
 
 import math
+import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -22,26 +24,8 @@ OUTLIER_M: Final = 0.1
 LONGEST_S: Final = 1e3
 """Any capture has come by then."""
 
-QUANTITIES: Final[dict[str, str]] = {
-    "capture_s": "time one capture takes, read-out included",
-    "frame_rate_hz": "frames a second back to back",
-    "range_rmse_m": "root mean square error of the range (Pisarenko), all pixels",
-    "range_median_m": "median absolute error of the range",
-    "range_std_m": "standard deviation between captures of a typical pixel",
-    "range_outliers": f"share of pixels off by more than {OUTLIER_M:g} m",
-    "range_missing": "share of lit pixels without a range",
-    "maximum_entropy_rmse_m": "the same error with the first maximum entropy peak as range",
-    "single_frequency_rmse_m": "the same error with the phase of b_1 alone",
-    "returns_right": "share of pixels with as many returns as there are",
-    "cumulative_mean": "error of the cumulative density, mean over pixels and times of flight, "
-    "as a share of the brightness",
-    "cumulative_worst": "the same at the worst time of flight of each pixel, mean over pixels",
-    "bound_width": "sharp bounds on the smoothed density: upper less lower, mean over pixels and "
-    "times, over the mean density",
-    "valid": "share of pixels without any flag",
-    "biased": "share of pixels that had to be biased",
-    "saturated": "share of pixels at the end of the scale",
-}
+_WORDS: Final = tomllib.loads(Path(__file__).with_name("quantities.toml").read_text("utf-8"))
+QUANTITIES: Final = {name: words.format(outlier_m=OUTLIER_M) for name, words in _WORDS.items()}
 """What is measured, for the page."""
 
 

@@ -54,27 +54,10 @@ from transientcam_server.settings import Settings
 
 API: Final = "/api/v1"
 _RESOURCES = (
-    info,
-    neighbours,
-    camera,
-    lease,
-    sequence,
-    reconstruction,
-    calibrations,
-    acquisition,
-    frames,
-    preview,
-    recordings,
-    recording_frames,
-    recording_zarr,
-    products,
-    simulation,
-    plan,
-    tradeoff,
-    series,
-    parameters,
-    jobs,
-)
+    info, neighbours, camera, lease, sequence, reconstruction, calibrations, acquisition, frames,
+    preview, recordings, recording_frames, recording_zarr, products, simulation, plan, tradeoff,
+    series, parameters, jobs,
+)  # fmt: skip
 
 
 def build_app(camera: Camera, settings: Settings) -> FastAPI:

@@ -14,22 +14,10 @@ from transientcam_server.recording._reader import Recording
 from transientcam_server.recording._recorder import Recorder
 
 _UNREADABLE: Final[dict[str, Any]] = {
-    "name": "",
-    "started_s": None,
-    "frames": 0,
-    "synced_frames": None,
-    "dropped_frames": 0,
-    "duration_s": 0.0,
-    "reason": None,
-    "annotations": {},
-    "sequence": None,
-    "camera": {},
-    "calibration": {},
-    "width": None,
-    "height": None,
-    "versions": {},
-    "limits": None,
-}
+    "name": "", "started_s": None, "frames": 0, "synced_frames": None, "dropped_frames": 0,
+    "duration_s": 0.0, "reason": None, "annotations": {}, "sequence": None, "camera": {},
+    "calibration": {}, "width": None, "height": None, "versions": {}, "limits": None,
+}  # fmt: skip
 """The fields of a file that cannot be read."""
 
 
