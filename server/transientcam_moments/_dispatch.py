@@ -43,6 +43,8 @@ or None for other than the usual models
 
 ``pairs(b (m+1, P), variance (m+1, P), error) -> attributes of Likelihood``, of two returns
 
+``cumulative``, with the signature of ``density``, is computed on devices only.
+
 ``harmonics(given, current, polynomial (m+1, P), mixed (K m, P), inverse (m, P), orders) ->
 following (m+1, P), misfit (P)``, or None for orders above 31
 
@@ -53,8 +55,10 @@ Importing this module imports no compiler: numba is imported by the thread that 
 """
 
 import os
-from collections.abc import Callable
-from functools import wraps
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import partial, wraps
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -94,6 +98,23 @@ _FEW_ROOTS: Final = (
 
 Planar = Callable[..., Any]
 Kernel = Callable[..., Any]
+Elsewhere = Callable[..., Any] | None
+"""Takes name, order and arguments of a kernel; computes the same on a device, or by ``here()``."""
+_ELSEWHERE: Final = ContextVar[Elsewhere]("elsewhere", default=None)
+EVERYWHERE: Final[list[Elsewhere]] = [None]
+"""What is asked outside of `elsewhere`."""
+PLANAR: Final[dict[str, Planar]] = {}
+"""Planar functions by the names of kernels that may stand in for them."""
+
+
+@contextmanager
+def elsewhere(way: Elsewhere) -> Iterator[None]:
+    """Have calls inside ask what may compute them in single precision; None: as outside."""
+    token = _ELSEWHERE.set(way or _ELSEWHERE.get())
+    try:
+        yield
+    finally:
+        _ELSEWHERE.reset(token)
 
 
 class Key(NamedTuple):
@@ -122,7 +143,7 @@ class Key(NamedTuple):
             return False
         if self.name in _DOUBLE_ONLY and self.precision != "d":
             return False
-        if self.name == "pairs" and self.harmonics < 2:
+        if (self.name == "pairs" and self.harmonics < 2) or self.name == "cumulative":
             return False
         # a characteristic polynomial with more roots underflows where they cluster
         return self.harmonics <= MOST_ROOTS or self.name not in _FEW_ROOTS
@@ -164,8 +185,17 @@ def accelerated(
     """
 
     def decorate(planar: Planar) -> Planar:
+        PLANAR[name] = planar
+
         @wraps(planar)
         def run(planes: Any, *rest: Any, spread: Spread | None = None) -> Any:
+            way = _ELSEWHERE.get() or EVERYWHERE[0]
+            if way is None or not isinstance(planes, np.ndarray) or planes.dtype.char not in "fF":
+                return here(planes, *rest, spread=spread)
+            by_here = partial(here, planes, *rest, spread=spread)
+            return way(name, order(planes, *rest), planes, *rest, here=by_here)
+
+        def here(planes: Any, *rest: Any, spread: Spread | None) -> Any:
             kernel = key = None
             if isinstance(planes, np.ndarray) and planes.ndim:
                 precision = PRECISIONS.get(planes.dtype.char) if of is None else "f"

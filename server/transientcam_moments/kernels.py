@@ -36,6 +36,7 @@ from transientcam_compiled import (
 from transientcam_moments import _gpu
 from transientcam_moments._dispatch import (
     CACHE,
+    EVERYWHERE,
     KERNELS,
     LEAST_PIXELS,
     MOST_ROOTS,
@@ -120,7 +121,7 @@ def devices(check: int | None = None) -> list[_gpu.Adapter]:
 
 
 def use_device(name: str) -> None:
-    """Have each `Reconstructor` made from now on use a device, unless it is given one.
+    """Have calls from now on use a device, and each `Reconstructor` unless it is given one.
 
     ``name``: as the Reconstructor takes it; "cpu" until this is called.
 
@@ -135,6 +136,8 @@ def use_device(name: str) -> None:
     if device is not None and name != "auto":
         device.require(0)
     _gpu.CHOICE[0] = name
+    choice = _gpu.Choice(device, automatic=name == "auto")
+    EVERYWHERE[0] = choice.kernel if device else None
 
 
 def device_state() -> _gpu.DeviceState | None:

@@ -11,7 +11,7 @@ import pytest
 
 import transientcam_moments as tm
 from transientcam_moments._gpu import Device, DevicePass, _host
-from transientcam_moments._gpu._fits import DeviceFits
+from transientcam_moments._gpu._kernels import DeviceKernel
 
 DRIVERS: Final = {
     "llvmpipe": "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json",  # of mesa-vulkan-drivers
@@ -24,7 +24,7 @@ class CountingDevice(Device):
 
     frames = 0
 
-    def frame(self, one: DevicePass | DeviceFits, given: Sequence[Any]) -> Any:
+    def frame(self, one: DevicePass | DeviceKernel, given: Sequence[Any]) -> Any:
         found = super().frame(one, given)
         self.frames += found is not None
         return found

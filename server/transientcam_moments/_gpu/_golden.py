@@ -7,12 +7,18 @@ from typing import Any, Final
 import numpy as np
 
 from transientcam_compiled import at_once
+from transientcam_moments._dispatch import PLANAR
 from transientcam_moments._kernels.one_pass import Constants
 from transientcam_moments.arrays import Array
 from transientcam_moments.images import calibrate, gaussian_taps, inverse_gains, measure, smooth
-from transientcam_moments.likelihood import MODEL_ERROR, choice, likelihood
-from transientcam_moments.moment_problem import bias, pisarenko, separate, smallest_eigenvalue
-from transientcam_moments.noise import MomentNoise
+from transientcam_moments.likelihood import MODEL_ERROR, choice
+from transientcam_moments.moment_problem import (
+    bias,
+    levinson,
+    pisarenko,
+    separate,
+    smallest_eigenvalue,
+)
 
 SHAPE: Final = (24, 37)
 _SIGMA_PX, _EPSILON, _FULL_SCALE, _THRESHOLD = 0.6, 4e-3, 4095.0, 0.1
@@ -20,9 +26,10 @@ _MOST_REDONE: Final = 0.25
 _LIMITS: Final = {"smoothed": 5e-6, "validity": 5e-5, "brightness": 5e-5, "direct": 1e-2}
 """Largest errors, of the largest value; ten times those of devices that are right."""
 _LIMIT_RAD: Final = 2e-3
+_LIMIT_MEDIAN: Final = 1e-5
 _NOISE_DN: Final = 25.0
 _MOST_OTHERS: Final = 0.03
-"""Share of the pixels in which rounding may lead a likelihood to another model."""
+"""Share of numbers that rounding may change, as where it leads to another model."""
 
 
 def wrong(m: int, make: Callable[[int, tuple[int, ...], Constants], Any]) -> str:
@@ -65,30 +72,27 @@ def wrong(m: int, make: Callable[[int, tuple[int, ...], Constants], Any]) -> str
     return ""
 
 
-def wrong_likelihood(m: int, estimate: Callable[..., Any]) -> str:
-    """Say what a device's likelihood makes wrong of a known frame of an order; as `wrong`.
+def wrong_kernel(name: str, m: int, compute: Callable[..., Any]) -> str:
+    """Say what a device makes wrong of a known frame in the place of a kernel; as `wrong`.
 
-    ``estimate``: returns that of a device.
+    ``compute``: takes that kernel's arguments.
     """
     b = calibrate(measure(_images(m).astype(float), zeroth="low-frequency"), _gains(m))
     b = b.reshape(m + 1, -1).astype(np.complex64)
-    noise = MomentNoise(np.full(m + 1, _NOISE_DN**2, np.float32))
-    options = choice.MOST_RETURNS, choice.TAIL_SHAPES, MODEL_ERROR, _THRESHOLD
-    found = estimate(b, np.broadcast_to(noise.variance[:, None], b.shape), *options)
-    if found is None:
+    c, phase = levinson(bias(b, _EPSILON).moments), np.linspace(-1, 6, 5)
+    given: tuple[Any, ...] = (*c[1:], c.error, phase)
+    if name == "likelihood":
+        variance = np.full(b.shape, _NOISE_DN**2, np.float32)
+        given = b, variance, choice.MOST_RETURNS, choice.TAIL_SHAPES, MODEL_ERROR, _THRESHOLD
+    if (found := compute(*given)) is None:
         return "it gave none"
-    known = likelihood(b.astype(complex), noise, model_error=MODEL_ERROR, threshold=_THRESHOLD)
-    *_, chi_square, free, count, mean, std, _ = found
-    off = np.abs(np.angle(np.exp(1j * (mean - known.average_rad))))
-    for name, alike in (
-        ("phase", off <= 0.05 * known.average_std_rad + _LIMIT_RAD),
-        ("deviation", np.abs(std - known.average_std_rad) <= 0.05 * known.average_std_rad),
-        ("chi-square", np.abs(chi_square - known.chi_square) <= 0.05 * (1 + known.chi_square)),
-        ("number of returns", (count == known.count) & (free == known.degrees_of_freedom)),
-    ):
-        if (share := 1 - alike.mean()) > _MOST_OTHERS:
-            return f"{name} is another one in {share:.0%} of the pixels"
-    return ""
+    wide = (x.astype(np.result_type(x, "d")) if isinstance(x, np.ndarray) else x for x in given)
+    found, known = np.vstack(found), np.vstack(PLANAR[name](*wide))
+    off = np.abs(found - known) / (np.abs(known) + 1e-3 * np.nanmax(np.abs(known)))
+    off = np.where(np.isnan(found) & np.isnan(known), 0, np.nan_to_num(off, nan=1.0))
+    median, most = np.quantile(off, (0.5, 1 - _MOST_OTHERS))
+    right = median <= _LIMIT_MEDIAN and most <= _LIMIT_RAD
+    return "" if right else f"{name} is off by {median:.1e}, at most {most:.1e}"
 
 
 def _gains(m: int) -> Array:

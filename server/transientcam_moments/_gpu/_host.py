@@ -13,19 +13,19 @@ import time
 import weakref
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, TypedDict
 
 import numpy as np
 
-from transientcam_compiled import ChildProcess
-from transientcam_moments._dispatch import LEAST_PIXELS
+from transientcam_compiled import ChildProcess, empty
+from transientcam_moments._dispatch import LEAST_PIXELS, Key, lookup
 from transientcam_moments._gpu import _device as there
 from transientcam_moments._gpu._device import SOFTWARE, Adapter
-from transientcam_moments._gpu._fits import DeviceFits
-from transientcam_moments._gpu._golden import wrong, wrong_likelihood
+from transientcam_moments._gpu._golden import wrong, wrong_kernel
+from transientcam_moments._gpu._kernels import ARRANGED, DeviceKernel, asked
 from transientcam_moments._gpu._passes import DevicePass
 from transientcam_moments._kernels.one_pass import Constants
 from transientcam_moments.arrays import Array
@@ -35,13 +35,14 @@ _ROUNDS: Final = 3
 """Frames that "auto" measures on device and processor each; the first of each does not count."""
 _MOST_ROOTS: Final = 8
 _KEPT: Final = 4
-"""Kinds of frames whose likelihoods are kept prepared."""
+"""Kinds of frames whose likelihoods and films are kept prepared."""
 _FAILURES: Final = 3
 """In a row, after which a device is asked no more."""
 _ASKS: Final = 480
 """Times that a call is asked whether it goes on, four a second, until the device hangs."""
 _MEMORY_BYTES: Final = 1 << 40
 """Drivers take much room that they do not use."""
+_Prepared = DevicePass | DeviceKernel
 
 
 class DeviceState(TypedDict):
@@ -72,7 +73,7 @@ class Device:
         self._child = ChildProcess(memory_bytes=_MEMORY_BYTES, nice=0)
         self._lock = threading.Lock()
         self._checks: dict[tuple[str, int], Future[str]] = {}
-        self._fits: dict[tuple[Any, ...], DeviceFits] = {}
+        self._kernels: dict[tuple[Any, ...], DeviceKernel] = {}
         self._failures, self.failed, self._reason = 0, "", ""
         self._results = {"device": 0, "processor": 0}
         self._most_bytes = 0
@@ -112,8 +113,8 @@ class Device:
         made = DevicePass(self.frame, m, shape, constants, images=images, hostile=self._hostile)
         return None if max(made.sizes) > self._most_bytes else made
 
-    def frame(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
-        """Return the results of a frame, as `rows_of` has them; None where the device failed."""
+    def frame(self, one: _Prepared, given: Sequence[Array]) -> Any:
+        """Return the results of a frame, float32 (n, P); None where the device failed."""
         found = self._thread.submit(self._frame, one, given).result()
         with self._lock:
             self._results["processor" if found is None else "device"] += 1
@@ -129,31 +130,32 @@ class Device:
             "refused": next(filter(None, [*checks, self._reason]), None),
         }
 
-    def likelihood(
-        self, b: Array, variance: Array, *options: Any, wait: bool = True
-    ) -> tuple[Array, ...] | None:
-        """Estimate returns as the kernel of that name does.
+    def kernel(self, name: str, m: int, *given: Any, wait: bool = True) -> Any:
+        """Compute what the kernel of that name does of the same arguments.
 
         None where the device does not take them, or fails; nor, unless it may ``wait``, until
-        its likelihoods of that order have been found right.
+        it has been found right with that kernel and order.
         """
-        m, pixels = len(b) - 1, b.shape[1]
-        if b.dtype != np.complex64 or pixels < LEAST_PIXELS or m > _MOST_ROOTS or self._reason:
+        usual = name in ARRANGED and given[0].dtype == np.complex64
+        if not usual or given[0].shape[1] < LEAST_PIXELS or m > _MOST_ROOTS or self._reason:
             return None
-        check = self._check("likelihood", m)
+        check = self._check(name, m)
         if not (wait or check.done()) or check.result():
             return None
-        key = m, pixels, *options
+        return self._asked(self.frame, name, m, *given)
+
+    def _asked(self, frame: Callable[..., Any], name: str, m: int, *given: Any) -> Any:
+        wanted = asked(name, given)
+        key = name, m, given[0].shape[1], *wanted[1:]
         with self._lock:
-            if key not in self._fits:
-                while len(self._fits) >= _KEPT:
-                    self._fits.pop(next(iter(self._fits)))
-                self._fits[key] = DeviceFits(m, pixels, *options, hostile=self._hostile)
-            one = self._fits[key]
-        found: tuple[Array, ...] | None = None
-        if max(one.sizes) <= self._most_bytes:
-            found = self.frame(one, one.given(b, variance))
-        return found
+            if key not in self._kernels:
+                while len(self._kernels) >= _KEPT:
+                    self._kernels.pop(next(iter(self._kernels)))
+                self._kernels[key] = DeviceKernel(*key[:3], wanted, hostile=self._hostile)
+            one = self._kernels[key]
+        served = one.sizes[3] > 0 and max(one.sizes) <= self._most_bytes
+        found = frame(one, [wanted.data]) if served else None
+        return None if found is None else ARRANGED[name](found, *given)
 
     def close(self) -> None:
         """End its process."""
@@ -182,12 +184,9 @@ class Device:
         def make(*given: Any) -> DevicePass:
             return DevicePass(self._frame, *given, images=True, hostile=self._hostile)
 
-        def estimate(b: Array, variance: Array, *options: Any) -> Any:
-            one = DeviceFits(m, b.shape[1], *options, hostile=self._hostile)
-            return self._frame(one, one.given(b, variance))
-
         self.failed = ""
-        found = wrong(m, make) if kind == "pass" else wrong_likelihood(m, estimate)
+        compute = partial(self._asked, self._frame, kind, m)
+        found = wrong(m, make) if kind == "pass" else wrong_kernel(kind, m, compute)
         if self.failed:
             return f"{self.adapter.name} failed: {self.failed}"
         return f"{self.adapter.name} computes known frames wrongly: {found}" if found else ""
@@ -218,7 +217,7 @@ class Device:
             f"{names} computes on the processor" if names else "no adapter was found"
         )
 
-    def _frame(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
+    def _frame(self, one: _Prepared, given: Sequence[Array]) -> Any:
         if self._reason:
             return None
         try:
@@ -234,7 +233,7 @@ class Device:
         self._failures = 0
         return found
 
-    def _computed(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
+    def _computed(self, one: _Prepared, given: Sequence[Array]) -> Any:
         room = self._shared(max(sum(one.sizes[:2]) or one.sizes[2], one.sizes[3]))
         while self._dropped:
             self._call(there.forget, self._dropped.pop())
@@ -248,7 +247,9 @@ class Device:
             np.frombuffer(room, np.uint8, bytes_.size, at)[:] = bytes_
             at += one.sizes[0] if len(given) > 1 else 0
         self._call(there.run, one.key)
-        return one.rows_of(room)
+        out = empty((one.sizes[3] // (4 * one.pixels), one.pixels), np.float32)
+        out[...] = np.frombuffer(room, np.float32, out.size).reshape(out.shape)
+        return out
 
     def _shared(self, size: int) -> mmap.mmap:
         """Return memory of at least so many bytes that both processes see."""
@@ -303,6 +304,35 @@ class Race:
             took = times[not on_device]
             if len(took) < _ROUNDS:
                 took.append(took_s)
+        return here() if found is None else found
+
+
+class Choice:
+    """What computes: a device, the processor (None), or of "auto" whichever is faster."""
+
+    def __init__(self, device: Device | None, *, automatic: bool) -> None:
+        self.device, self.automatic, self.race = device, automatic, Race()
+
+    def device_for(self, m: int) -> Device | None:
+        """Return the device for frames of an order, if there is one; may wait for its check."""
+        if self.device is None or m > _MOST_ROOTS:
+            return None
+        if not self.automatic:
+            self.device.require(m)
+            return self.device
+        return self.device if self.device.is_ready(m) else None
+
+    def kernel(self, name: str, m: int, *given: Any, here: Callable[[], Any]) -> Any:
+        """Compute what a kernel does where that is chosen; has the face of `Elsewhere`."""
+        device = self.device_for(m) if name in ARRANGED else None
+        if device is None:
+            return here()
+        there = partial(device.kernel, name, m, *given, wait=not self.automatic)
+        rival = lookup(name, m, given[0].shape[1]) or not Key.of(name, m, "f").is_offered
+        if self.automatic and rival:  # alike are those of about the same size
+            sizes = (np.size(each).bit_length() for each in given)
+            return self.race.run((name, m, *sizes), there, here)
+        found = there()
         return here() if found is None else found
 
 

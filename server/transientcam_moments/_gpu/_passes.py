@@ -3,11 +3,11 @@
 import math
 from collections.abc import Callable, Sequence
 from itertools import count
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from transientcam_compiled import Spread, empty
+from transientcam_compiled import Spread
 from transientcam_moments._dispatch import HEAVY_PIXELS, LEAST_PIXELS, lookup
 from transientcam_moments._gpu._shader import EPS, PLANES, ZEROTH, rows, shader
 from transientcam_moments._kernels.arrays import Booleans, Complexes, Images
@@ -20,51 +20,32 @@ _SATURATED, _REPLACED = 4, 32  # transientcam_moments.Flags
 KEYS = count()
 
 
-class Rows(NamedTuple):
-    """What a frame's results are on a device: the rows of `PLANES`, and arrays (n, P)."""
-
-    planes: list[Any]
-    phase: Any
-    weight: Any
-    smoothed: Any
-    """Without rows where moments were given."""
-
-
-Compute = Callable[["DevicePass", Sequence[Array]], Rows | None]
-
-
 class DevicePass:
     """Reconstructs frames of one order and shape on a device; has the face of `OnePass`.
 
-    ``compute``: takes this pass and what it uploads; returns its results, row by row, or None
-    where the device gave none.
+    ``compute``: takes this pass and what it uploads; returns rows of results (n, P), those of
+    `PLANES` first, or None where the device gave none.
     ``hostile``: see `shader`.
     """
 
     def __init__(
-        self,
-        compute: Compute,
-        m: int,
-        shape: tuple[int, ...],
-        constants: Constants,
-        *,
-        images: bool,
-        hostile: bool = False,
-    ) -> None:
+        self, compute: Callable[["DevicePass", Sequence[Array]], Any], m: int,
+        shape: tuple[int, ...], constants: Constants, *, images: bool, hostile: bool = False,
+    ) -> None:  # fmt: skip
         self._compute, self._m, self._shape, self._constants = compute, m, shape, constants
-        self._pixels = math.prod(shape)
+        self.pixels = math.prod(shape)
         self._images = images
         zeroth = constants.settings.zeroth
         self._estimated = zeroth == "estimated"
         self.code = shader(m, zeroth, images=images, hostile=hostile)
         bad = 0 if constants.bad is None or not images else len(constants.bad)
         replaced = bad if constants.replaced is not None else 0
-        raw = 2 * self._pixels * (ZEROTH[zeroth] + 4 * m) if images else 0
+        raw = 2 * self.pixels * (ZEROTH[zeroth] + 4 * m) if images else 0
         self.sizes = (
             (raw + 3) // 4 * 4,
             8 * replaced * (m + 1),
-            8 * self._pixels * (m + 1),
-            4 * self._pixels * rows(m, images=images),
+            8 * self.pixels * (m + 1),
+            4 * self.pixels * rows(m, images=images),
         )
         self.key = next(KEYS)  # unlike that of any other
         self.inputs = self._inputs(replaced)
@@ -75,17 +56,17 @@ class DevicePass:
         taps = constants.taps if self._images else None
         planes = np.asarray(constants.inverse, np.complex64).reshape(self._m + 1, -1)
         usable = np.isfinite(planes).all(axis=0)
-        present = np.broadcast_to(usable, self._pixels)
+        present = np.broadcast_to(usable, self.pixels)
         if not self._images:
             present = np.ones_like(present)
         weight = np.where(present, np.float32(1), np.float32(np.nan))
         if taps is not None:
             weight = normalisation(present.reshape(self._shape), taps)[::2]
         taps = np.ones(1) if taps is None else taps
-        places = np.zeros(self._pixels if replaced else 1, np.uint32)
+        places = np.zeros(self.pixels if replaced else 1, np.uint32)
         if replaced:
             places[constants.bad] = np.arange(1, replaced + 1)
-        height, width = self._shape if len(self._shape) == 2 else (1, self._pixels)
+        height, width = self._shape if len(self._shape) == 2 else (1, self.pixels)
         params = np.zeros(12, np.uint32)
         params[:5] = width, height, taps.size // 2, planes.shape[1] > 1, replaced
         params[6:].view(np.float32)[:] = (
@@ -99,32 +80,21 @@ class DevicePass:
         self, images: Images, saturated: Booleans | bool | None, spread: Spread
     ) -> Planes | None:
         """Reconstruct raw images as `OnePass.images` does; None where the device failed."""
-        raw = np.ascontiguousarray(images).reshape(len(images), self._pixels)
+        raw = np.ascontiguousarray(images).reshape(len(images), self.pixels)
         given: list[Array] = [raw]
         if self._constants.replaced is not None:
             given.append(np.asarray(self._constants.replaced(raw), np.complex64))
         found = self._compute(self, given)
         if found is None:
             return None
-        return self._planes(found, found.smoothed, saturated, spread)
-
-    def rows_of(self, room: Any) -> Rows:
-        """Return copies of results in memory that other frames will use."""
-        m, pixels = self._m, self._pixels
-        values = np.frombuffer(room, np.float32, self.sizes[3] // 4).reshape(-1, pixels)
-        first = len(PLANES)
-        parts = [*values[:first], values[first : first + m], values[first + m : first + 2 * m]]
-        parts.append(values[first + 2 * m :].reshape(-1).view(np.complex64).reshape(-1, pixels))
-        copies = [empty(part.shape, part.dtype) for part in parts]
-        for copy, part in zip(copies, parts, strict=True):
-            copy[...] = part
-        return Rows(copies[:first], *copies[first:])
+        smoothed = found[len(PLANES) + 2 * self._m :].reshape(-1).view(np.complex64)
+        return self._planes(found, smoothed.reshape(-1, self.pixels), saturated, spread)
 
     def moments(
         self, smoothed: Complexes, saturated: Booleans | bool | None, spread: Spread
     ) -> Planes | None:
         """Reconstruct moments as `OnePass.moments` does; None where the device failed."""
-        planes = np.ascontiguousarray(smoothed).reshape(len(smoothed), self._pixels)
+        planes = np.ascontiguousarray(smoothed).reshape(len(smoothed), self.pixels)
         found = self._compute(self, [planes])
         if found is None:
             return None
@@ -133,10 +103,11 @@ class DevicePass:
         return self._planes(found, planes, False if saturated is None else saturated, spread)
 
     def _planes(
-        self, found: Rows, smoothed: Complexes, saturated: Booleans | bool | None, spread: Spread
+        self, found: Array, smoothed: Complexes, saturated: Booleans | bool | None, spread: Spread
     ) -> Planes:
         m, bad = self._m, self._constants.bad
-        *numbers, packed = found.planes
+        *numbers, packed = found[: len(PLANES)]
+        phase, weight = found[len(PLANES) :][:m], found[len(PLANES) + m :][:m]
         packed = packed.view(np.uint32)
         flags, number = (packed & 255).astype(np.uint8), (packed >> 8).astype(np.int32)
         if saturated is not None:
@@ -148,7 +119,7 @@ class DevicePass:
         if self._estimated:
             smoothed[0] = brightness
         planes = Planes(
-            smoothed, brightness, validity, flags, found.phase, found.weight, number, uniform,
+            smoothed, brightness, validity, flags, phase, weight, number, uniform,
             direct, indirect, range_m,
         )  # fmt: skip
         ill = np.flatnonzero(residual > sparse.largest_residual(m, EPS))

@@ -168,27 +168,18 @@ def _analysed(m: int, *, estimated: bool) -> str:
     range_m: Any = angle * writer.put("params.metres")
     sound = writer.put("sound", "bool")
     valid: Any = sound & finite & ~dark
-    known = {"brightness": brightness, "validity": validity, "uniform": uniform}
-    values = {
-        name: writer.put(f"select(params.nan, {literal(value)}, sound)")
-        for name, value in known.items()
-    } | {
-        "direct": direct,
-        "indirect": indirect,
-        "range": writer.put(f"select(params.nan, {literal(range_m)}, {valid.name})"),
-        "residual": residual,
-    }
-    at = {name: f"out[{row}u * pixels + p]" for row, name in enumerate(PLANES)}
-    lines = [f"{at[name]} = bitcast<u32>({literal(value)});" for name, value in values.items()]
-    flags = [f"({at['packed']} & 4u)", f"select({NON_FINITE}u, 0u, sound && {literal(finite)})"]
+    for row, value in enumerate((brightness, validity, uniform)):
+        writer.store(f"{row}u", value, "sound")
+    writer.store("5u", range_m, valid.name)
+    others = {3: direct, 4: indirect, 6: residual}
+    others |= dict(enumerate([*phases, *weights], len(PLANES)))
+    for row, value in others.items():
+        writer.store(f"{row}u", value)
+    packed = f"out[{len(PLANES) - 1}u * pixels + p]"
+    flags = [f"({packed} & 4u)", f"select({NON_FINITE}u, 0u, sound && {literal(finite)})"]
     flags += [
         f"select(0u, 2u, sound && {literal(dark)})",
         f"select(0u, 1u, sound && {literal(biased)})",
     ]
-    lines.append(f"{at['packed']} = {' | '.join(flags)} | (u32({literal(count)}) << 8u);")
-    for k in range(m):
-        for row, value in ((k, phases[k]), (m + k, weights[k])):
-            lines.append(
-                f"out[{len(PLANES) + row}u * pixels + p] = bitcast<u32>({literal(value)});"
-            )
-    return "\n".join(writer.lines + lines)
+    packing = f"{packed} = {' | '.join(flags)} | (u32({literal(count)}) << 8u);"
+    return "\n".join([*writer.lines, packing])

@@ -8,9 +8,13 @@ the same one twice only one, and `repeat` a loop. What `some` would leave out is
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+
+from transientcam_moments.moment_problem import phase_of
+
+VECTOR: Final = "vec2<f32>"
 
 
 class Writer:
@@ -27,7 +31,7 @@ class Writer:
         if name is None:
             name = self._known[text] = self._name()
             self.lines.append(f"let {name}: {kind} = {text};")
-        return Traced(self, name, kind)
+        return (Complex if kind == VECTOR else Traced)(self, name, kind)
 
     def variable(self, value: Any) -> str:
         """Return the name of a new variable that begins as a plane or a number."""
@@ -47,6 +51,11 @@ class Writer:
         for name, plane in zip(names, _planes(state), strict=True):
             self.lines.append(f"{name} = {literal(plane)};")
 
+    def store(self, row: str, value: Any, when: str = "true") -> None:
+        """Put a number in a row of the results; NaN where it is none."""
+        number = f"select(params.nan, {literal(value)}, {when})"
+        self.lines.append(f"out[({row}) * pixels + p] = bitcast<u32>({number});")
+
     @contextmanager
     def loop(self, head: str) -> Iterator[None]:
         """Write a loop; what is computed inside is not known behind it."""
@@ -63,7 +72,8 @@ class Writer:
 
 def _operator(text: str, kind: str = "f32") -> Callable[..., Any]:
     def put(self: "Traced", *other: Any) -> Any:
-        return self.writer.put(text.format(self.name, *map(literal, other)), kind)
+        others = map(_vector if kind == VECTOR else literal, other)
+        return self.writer.put(text.format(self.name, *others), kind)
 
     return put
 
@@ -73,6 +83,7 @@ class Traced:
 
     __array_ufunc__ = None  # NumPy's numbers leave operations to this class
     dtype = np.dtype(np.float32)
+    real = property(lambda self: self)
     __hash__ = None  # type: ignore[assignment]  # as planes
 
     def __init__(self, writer: Writer, name: str, kind: str = "f32") -> None:
@@ -100,6 +111,35 @@ class Traced:
     __and__, __or__ = _operator("{0} & {1}", "bool"), _operator("{0} | {1}", "bool")
 
 
+class Complex(Traced):
+    """A pixel's complex number."""
+
+    real, imag = property(_operator("{0}.x")), property(_operator("{0}.y"))
+    conj, __neg__ = _operator("conjugate({0})", VECTOR), _operator("-{0}", VECTOR)
+    __add__ = __radd__ = _operator("{0} + {1}", VECTOR)
+    __sub__, __rsub__ = _operator("{0} - {1}", VECTOR), _operator("{1} - {0}", VECTOR)
+
+    def __mul__(self, other: Any) -> Any:
+        text = "times({}, {})" if isinstance(other, Complex) else "{} * {}"
+        return self.writer.put(text.format(self.name, literal(other)), VECTOR)
+
+    def __truediv__(self, other: Any) -> Any:
+        return self * (1.0 / other)
+
+    __rmul__ = __mul__
+
+
+def _vector(value: Any) -> str:
+    return value.name if isinstance(value, Complex) else f"{VECTOR}({literal(value)}, 0.0)"
+
+
+class Planes(list[Any]):
+    """Planes of a pixel, as an array of them."""
+
+    shape = property(lambda self: (len(self),))
+    __array_namespace__ = Traced.__array_namespace__
+
+
 def literal(value: Any) -> str:
     """Return how a plane or a number is written; WGSL has neither NaN nor infinity."""
     if isinstance(value, Traced):
@@ -115,9 +155,25 @@ def literal(value: Any) -> str:
 class Words:
     """The words of `arrays` that are no operators, by the names that it asks a namespace for."""
 
-    where = staticmethod(
-        lambda mask, yes, no: mask.writer.put(f"select({literal(no)}, {literal(yes)}, {mask.name})")
+    stack = Planes
+    ones_like = staticmethod(lambda x: 0.0 * x + 1.0)
+    log, log1p = staticmethod(_operator("log_of({0})")), staticmethod(_operator("log_1p({0})"))
+    to_complex = staticmethod(
+        lambda x, y: x.writer.put(f"{VECTOR}({literal(x)}, {literal(y)})", VECTOR)
     )
+    where = staticmethod(
+        lambda mask, yes, no: mask.writer.put(
+            f"select({literal(no)}, {literal(yes)}, {mask.name})", getattr(yes, "kind", "f32")
+        )
+    )
+
+    @staticmethod
+    def arctan2(y: Any, x: Any) -> Any:
+        """Return the angle of a point, from -pi to pi."""
+        inverse = 1.0 / Words.sqrt(x * x + y * y)
+        angle = phase_of(x * inverse, abs(y) * inverse)
+        return Words.where(y < 0.0, -angle, angle)
+
     maximum = staticmethod(_operator("max({0}, {1})"))
     minimum = staticmethod(_operator("min({0}, {1})"))
     sqrt = staticmethod(_operator("root_of({0})"))

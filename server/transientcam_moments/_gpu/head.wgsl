@@ -38,3 +38,23 @@ fn image(i: u32, p: u32, pixels: u32) -> f32 {
   let word = raw[at >> 1u];
   return f32(select(word & 0xffffu, word >> 16u, (at & 1u) == 1u));
 }
+fn times(a: vec2<f32>, b: vec2<f32>) -> vec2<f32> {
+  return vec2<f32>(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x);
+}
+fn conjugate(a: vec2<f32>) -> vec2<f32> { return vec2<f32>(a.x, -a.y); }
+// log(1 + x) to the last digits of x, from -1/2 to 3: halved three times, then a series.
+fn log_1p(x: f32) -> f32 {
+  let half = quotient(x, 1.0 + root_of(1.0 + x));
+  let quarter = quotient(half, 1.0 + root_of(1.0 + half));
+  let eighth = quotient(quarter, 1.0 + root_of(1.0 + quarter));
+  let c = quotient(eighth, 2.0 + eighth);
+  let square = c * c;
+  return 16.0 * c * (1.0 + square * (0.33333333 + square * (0.2 + square * 0.14285714)));
+}
+// log x of a number that is not subnormal: of its exponent and of its digits, from 1/2 to 2.
+fn log_of(x: f32) -> f32 {
+  let bits = bitcast<u32>(x);
+  let digits = bitcast<f32>((bits & 0x007fffffu) | 0x3f800000u);
+  let power = f32(i32(bits >> 23u) - 127);
+  return 0.6931471805599453 * power + log_1p(digits - 1.0);
+}

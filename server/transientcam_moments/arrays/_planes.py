@@ -168,8 +168,9 @@ def in_turn(angle: Array) -> Array:
 
 def to_complex(real: Array, imag: Array) -> Array:
     """Return real + i imag in the precision of its parts."""
-    if namespace(real) is not np:
-        return real + 1j * imag
+    xp = namespace(real)
+    if xp is not np:  # where nothing is computed here, it has its own
+        return xp.to_complex(real, imag) if hasattr(xp, "to_complex") else real + 1j * imag
     out = np.empty(real.shape, np.result_type(real.dtype, np.complex64))
     out.real = real
     out.imag = imag

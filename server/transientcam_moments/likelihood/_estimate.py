@@ -1,7 +1,6 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -255,12 +254,8 @@ def fitted(
     tail_shape: int | Sequence[int] = TAIL_SHAPES,
     model_error: float = 0.0,
     threshold: float = DIRECT_THRESHOLD,
-    elsewhere: Callable[..., tuple[Array, ...]] | None = None,
 ) -> Likelihood:
-    """Do what `likelihood` does, with the threads of a caller.
-
-    `elsewhere` may estimate on a device; it takes what gives the kernel's estimate as ``here``.
-    """
+    """Do what `likelihood` does, with the threads of a caller."""
     planes, trailing = moment_planes(b)
     if not 1 <= returns <= MOST_RETURNS:
         raise ParameterError("returns", returns, f"1 to {MOST_RETURNS}")
@@ -272,11 +267,7 @@ def fitted(
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     planes, variance = dense(planes, noise, harmonics, trailing)
     options = returns, shapes, float(model_error), float(threshold)
-    here = partial(_estimated, planes, variance, *options, spread=spread)
-    if elsewhere is None or not isinstance(planes, np.ndarray):
-        found = here()
-    else:
-        found = elsewhere(planes, variance, *options, here=here)
+    found = _estimated(planes, variance, *options, spread=spread)
     shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
     xp = namespace(planes)
     lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)

@@ -6,6 +6,7 @@ paper), with the bounds on what moments leave open.
 
 from transientcam_moments.moment_problem import (
     _circle as circle,
+    _cumulative as integrals,
     _eigenvalue as eigenvalue,
     _evaluation as evaluation,
     _extension as extension,

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.arrays import (
     Array,
     bank,
@@ -52,19 +53,24 @@ def cumulative(coefficients: Coefficients, phase_rad: Array) -> Array:
     quadrature on intervals that shrink towards the poles takes over. JAX arrays under `jit`
     always get the closed form.
     """
-    reflection = flat_planes(coefficients.reflection)
-    b0 = coefficients.brightness.reshape(-1)
-    phase = phases(phase_rad, like=reflection)
-    shape = (phase.shape[0], *coefficients.error.shape)
+    a, reflection = flat_planes(coefficients.polynomial), flat_planes(coefficients.reflection)
+    phase, error = phases(phase_rad, like=reflection), coefficients.error
+    found = _integrated(a, reflection, error.reshape(-1), phase)
+    return found.reshape((phase.shape[0], *error.shape))
+
+
+@accelerated("cumulative")
+def _integrated(a: Array, reflection: Array, error: Array, phase: Array) -> Array:
+    b0 = Coefficients(error, a, reflection).brightness
     if namespace(reflection) is not np:
-        return _closed_form(from_reflection(b0, reflection), phase)[0].reshape(shape)
+        return _closed_form(from_reflection(b0, reflection), phase)[0]
     exact = from_reflection(b0.astype(np.float64), reflection.astype(np.complex128))
     out = np.empty((phase.shape[0], b0.size), b0.dtype)
     pixels = max(128, _BLOCK_VALUES // max(1, phase.shape[0]))
     for start in range(0, b0.size, pixels):
         part = slice(start, start + pixels)
         out[:, part] = _with_fallback(Coefficients(*(x[..., part] for x in exact)), phase)
-    return out.reshape(shape)
+    return out
 
 
 def _with_fallback(coefficients: Coefficients, phase: Array) -> Array:
@@ -77,26 +83,36 @@ def _with_fallback(coefficients: Coefficients, phase: Array) -> Array:
 
 def _closed_form(coefficients: Coefficients, phase: Array) -> tuple[Array, Array]:
     """Planar statement of the closed form; also returns an estimate of its relative error."""
-    a = coefficients.polynomial
-    xp = namespace(a)
+    xp, dtype = namespace(coefficients.polynomial), coefficients.error.dtype
     with np.errstate(all="ignore"):
-        b = moments_of(coefficients)
-        b0 = b[0].real
-        poles = disc_roots(a)
-        shares, error = _shares(poles, coefficients, b)
+        b0, terms, error = expansion(coefficients)
         # whole turns are separated first: close to a sharp peak 2 pi + x isn't quite x
         turns = xp.floor(phase / (2 * np.pi))
-        rest = (phase - 2 * np.pi * turns)[:, None].astype(b0.dtype)
+        rest = (phase - 2 * np.pi * turns)[:, None].astype(dtype)
         backwards = to_complex(xp.cos(rest), -xp.sin(rest))
-        total = rest * b0
-        for pole, share in zip(poles, shares, strict=True):
-            # S(phi) - S(0), S(x) = sum_l C_l log(1 - p_l exp(-i x))
-            angle, stretch = _logarithm(pole * backwards)
-            angle_0, stretch_0 = _logarithm(pole)
-            total = total + 2 * (share.real * (angle - angle_0))
-            total = total + 2 * (share.imag * (stretch - stretch_0))
-        whole = turns[:, None].astype(b0.dtype) * b0
-        return xp.where(b0 > 0, total / (2 * np.pi) + whole, 0 * total), error
+        return until(b0, terms, turns[:, None].astype(dtype), rest, backwards), error
+
+
+def expansion(coefficients: Coefficients) -> tuple[Array, list[tuple[Any, ...]], Array]:
+    """Return b_0; p_l, C_l and log(1 - p_l) for each pole; and the error as of `_shares`."""
+    b = moments_of(coefficients)
+    poles = disc_roots(coefficients.polynomial)
+    shares, error = _shares(poles, coefficients, b)
+    return b[0].real, list(zip(poles, shares, map(_logarithm, poles), strict=True)), error
+
+
+def until(
+    b0: Array, terms: list[tuple[Any, ...]], turns: Array, rest: Array, backwards: Array
+) -> Array:
+    """Integrate from 0 to whole turns and the rest of one, whose exp(-i rest) is given."""
+    xp = namespace(b0)
+    total = rest * b0
+    for pole, share, (angle_0, stretch_0) in terms:
+        # S(phi) - S(0), S(x) = sum_l C_l log(1 - p_l exp(-i x))
+        angle, stretch = _logarithm(pole * backwards)
+        total = total + 2 * (share.real * (angle - angle_0))
+        total = total + 2 * (share.imag * (stretch - stretch_0))
+    return xp.where(b0 > 0, total / (2 * np.pi) + turns * b0, 0 * total)
 
 
 def _logarithm(w: Array) -> tuple[Array, Array]:

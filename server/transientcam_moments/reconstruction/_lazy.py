@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import elsewhere
 from transientcam_moments.arrays import Array, in_turn, map_html, namespace
 from transientcam_moments.comparisons import (
     PLUGINS,
@@ -113,7 +114,7 @@ class Reconstruction:
     known_noise : Sensor or ImageNoise, optional
         Of the images, where it was looked for before; that of the settings, when left out.
     device : callable, optional
-        The likelihood of a device, which stands in for the kernel's where it gives one.
+        Computes what kernels do on a device, where there is one; see `kernels.use_device`.
 
     Raises
     ------
@@ -432,16 +433,11 @@ class Reconstruction:
         most = MOST_RETURNS
         if harmonics is not None:
             most = min(most, sum(j > 0 for j in harmonics))
-        return fitted(
-            moments,
-            noise,
-            self._spread,
-            harmonics,
-            most,
-            model_error=error,
-            threshold=self.settings.threshold,
-            elsewhere=self._device,
-        )
+        at = self.settings.threshold
+        with elsewhere(self._device):
+            return fitted(
+                moments, noise, self._spread, harmonics, most, model_error=error, threshold=at
+            )
 
     @cached_property
     def two_returns(self) -> Likelihood:
@@ -663,12 +659,14 @@ class Reconstruction:
         """Return the density (T, ...) in the unit of the moments per second at times of flight."""
         turn = 2 * np.pi * self._base_frequency_hz
         time = np.asarray(time_s, dtype=float)
-        return turn * density(self.coefficients, turn * time, evaluation=evaluation)
+        with elsewhere(self._device):
+            return turn * density(self.coefficients, turn * time, evaluation=evaluation)
 
     def cumulative(self, time_s: Array) -> Array:
         """Return the brightness (T, ...) that has come back until times of flight in s."""
         turn = 2 * np.pi * self._base_frequency_hz
-        return cumulative(self.coefficients, turn * np.asarray(time_s, dtype=float))
+        with elsewhere(self._device):
+            return cumulative(self.coefficients, turn * np.asarray(time_s, dtype=float))
 
     @property
     def _base_frequency_hz(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from transientcam_compiled import Spread, at_once
 from transientcam_moments import _gpu
-from transientcam_moments._dispatch import LEAST_PIXELS, MOST_ROOTS, lookup, on_threads
+from transientcam_moments._dispatch import LEAST_PIXELS, lookup, on_threads
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Planes
 from transientcam_moments._kernels.padding import LEAST_WIDTH
 from transientcam_moments.arrays import Array, as_array
@@ -100,10 +100,9 @@ class Reconstructor:
         device: str | None = None,
     ) -> None:
         device = _gpu.CHOICE[0] if device is None else device
-        self._device, self._automatic = _gpu.device_of(device), device == "auto"
-        self._race = _gpu.Race()
-        if self._device is not None and not self._automatic and calibration is not None:
-            self._device.require(len(calibration) - 1)
+        self._choice = _gpu.Choice(_gpu.device_of(device), automatic=device == "auto")
+        if calibration is not None and not self._choice.automatic:
+            self._choice.device_for(len(calibration) - 1)
         self.settings = Settings() if settings is None else settings
         self._calibration = calibration
         self._bad = bad_pixels
@@ -180,7 +179,7 @@ class Reconstructor:
                 repaired=repaired,
                 calibration=self._calibration,
                 spread=spread,
-                device=self._likelihood,
+                device=self._choice.kernel,
                 images=images,
                 low=self._low(takes[0]),
             )
@@ -298,7 +297,7 @@ class Reconstructor:
             "repaired": frame.repaired,
             "calibration": gains,
             "spread": spread,
-            "device": self._likelihood,
+            "device": self._choice.kernel,
             "images": frame.images,
             "low": frame.low,
             "frames": frames,
@@ -455,7 +454,7 @@ class Reconstructor:
         if not usual or not masked or math.prod(shape) < LEAST_PIXELS:
             return []
         ways: list[tuple[Any, Callable[[], Pass | None]]] = []
-        if (device := self._device_for(m, math.prod(shape))) is not None:
+        if (device := self._choice.device_for(m)) is not None:
             make = partial(device.prepare, m, shape, images=images)
             ways.append(((device, images), lambda: make(self._constants(m, shape))))
         if (prepare := lookup("reconstruct", m, math.prod(shape))) is not None:
@@ -472,36 +471,15 @@ class Reconstructor:
             self._prepared[key] = made
         return self._prepared[key]
 
-    def _device_for(self, m: int, pixels: int) -> _gpu.Device | None:
-        """Return the device for frames of this kind, if there is one; may wait for its check."""
-        if self._device is None or m > MOST_ROOTS:
-            return None
-        if not self._automatic:
-            self._device.require(m)
-            return self._device
-        return self._device if self._device.is_ready(m) else None
-
     def _passed(
         self, kind: tuple[int, ...], passes: Sequence[Pass], run: Callable[[Pass], Planes | None]
     ) -> Planes | None:
         """Return what the first pass gives that gives anything; of "auto", the faster one's."""
-        if self._automatic and len(passes) == 2:
+        if self._choice.automatic and len(passes) == 2:
             device, kernel = passes
-            raced: Planes = self._race.run(kind, lambda: run(device), lambda: run(kernel))
+            raced: Planes = self._choice.race.run(kind, lambda: run(device), lambda: run(kernel))
             return raced
         return next((found for each in passes if (found := run(each)) is not None), None)
-
-    def _likelihood(self, b: Array, variance: Array, *options: Any, here: Callable[[], Any]) -> Any:
-        """Estimate likelihoods on the device, if there is one for frames of this kind."""
-        m, pixels = b.shape[0] - 1, b.shape[1]
-        device = self._device_for(m, pixels)
-        if device is None:
-            return here()
-        there = partial(device.likelihood, b, variance, *options, wait=not self._automatic)
-        if self._automatic and lookup("likelihood", m, pixels) is not None:
-            return self._race.run(("likelihood", *b.shape), there, here)
-        found = there()
-        return here() if found is None else found
 
     # -- preparing -----------------------------------------------------------------------------
 

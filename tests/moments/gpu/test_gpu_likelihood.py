@@ -11,8 +11,8 @@ from tests.moments.gpu_devices import CountingDevice, software_device
 from tests.moments.kernels import test_kernels_likelihood as of_the_kernel
 from transientcam_moments import _gpu
 from transientcam_moments._dispatch import KERNELS, Key
-from transientcam_moments._gpu import _fits
-from transientcam_moments._gpu._fits import likelihood_shader
+from transientcam_moments._gpu import _kernels
+from transientcam_moments._gpu._kernels import kernel_shader
 
 M = of_the_kernel.M
 
@@ -28,7 +28,7 @@ def _in_its_place(device: CountingDevice, monkeypatch: pytest.MonkeyPatch) -> It
     """Have the device in the place of the kernel, whose signature it has."""
 
     def estimate(*given: Any, **_: Any) -> Any:
-        return device.likelihood(*given)
+        return device.kernel("likelihood", M, *given)
 
     monkeypatch.setitem(KERNELS.compiled, Key.of("likelihood", M, "f"), estimate)
     before = device.frames
@@ -58,7 +58,7 @@ def test_likelihoods_are_right_with_the_worst_quotients_that_a_device_may_have(
 
 
 def test_a_device_whose_likelihood_is_spoilt_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = likelihood_shader
+    right = kernel_shader
 
     def spoilt(*args: Any, **given: Any) -> str:
         code = right(*args, **given)
@@ -66,10 +66,13 @@ def test_a_device_whose_likelihood_is_spoilt_is_not_asked(monkeypatch: pytest.Mo
         assert changed != code
         return changed
 
-    monkeypatch.setattr(_fits, "likelihood_shader", spoilt)
+    monkeypatch.setattr(_kernels, "kernel_shader", spoilt)
     with software_device("llvmpipe") as another:
         assert "computes known frames wrongly" in another._check("likelihood", 2).result()
-        assert another.likelihood(*(each[:3] for each in _images()), 3, (3,), 0.0, 0.1) is None
+        assert (
+            another.kernel("likelihood", 2, *(each[:3] for each in _images()), 3, (3,), 0.0, 0.1)
+            is None
+        )
 
 
 def test_a_reconstruction_has_its_likelihood_from_the_device(
@@ -88,7 +91,8 @@ def test_a_reconstruction_has_its_likelihood_from_the_device(
     assert device.frames == before + 1
     close = np.isclose(likelihood.average_rad, expected.average_rad, atol=1e-3, equal_nan=True)
     assert close.mean() > 0.99
-    assert device.likelihood(b.astype(complex), np.ones(b.shape), 3, (3,), 0.0, 0.1) is None
+    wide = b.astype(complex), np.ones(b.shape)
+    assert device.kernel("likelihood", M, *wide, 3, (3,), 0.0, 0.1) is None
 
 
 def _images() -> tuple[np.ndarray, np.ndarray]:

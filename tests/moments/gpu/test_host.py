@@ -269,10 +269,11 @@ def test_devices_are_listed_with_what_real_ones_make_wrong(monkeypatch: pytest.M
 
 def test_reconstructors_use_what_was_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_gpu, "CHOICE", ["cpu"])
+    monkeypatch.setattr(tm.kernels, "EVERYWHERE", [None])
     with pytest.raises(tm.DeviceUnavailable, match="no adapter has that name"):
         tm.kernels.use_device("gpu:none such")
     tm.kernels.use_device("auto")
 
     assert _gpu.CHOICE == ["auto"]
-    assert tm.Reconstructor()._automatic
-    assert not tm.Reconstructor(device="cpu")._automatic
+    assert tm.Reconstructor()._choice.automatic
+    assert not tm.Reconstructor(device="cpu")._choice.automatic

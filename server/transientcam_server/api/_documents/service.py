@@ -73,7 +73,7 @@ class InfoDocument(Document):
         name: str | None
         """Of the adapter; null until one was looked for, or where there is none."""
         results: dict[str, int]
-        """Passes and likelihoods that the device was asked for, by what computed them: `device`,
+        """Passes, likelihoods, films that the device was asked for, by what made them: `device`,
         or `processor` where it failed."""
         refused: str | None
         """Why nothing, or not everything, is computed there."""
