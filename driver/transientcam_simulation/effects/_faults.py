@@ -49,7 +49,8 @@ class _Fault(Effect):
             return Call(False, "the device has no such fault", 0.0, 0.0)
         still = issubclass(cls, PlaneEffect) and not conditions.moves
         changes = tuple(cls.change(conditions, figures, each) for each in conditions.glimpses)
-        cost_s = 0.0 if still else conditions.pixels * cls.cost_s_per_pixel
+        drawn_s = 2e-5 if issubclass(cls, ShotEffect) else 0.0
+        cost_s = 0.0 if still else drawn_s + conditions.pixels * cls.cost_s_per_pixel
         return weigh(conditions, changes, cls.reason.format(figures), cost_s)
 
 
@@ -155,7 +156,7 @@ class Jitter(_Fault, ShotEffect):
     what = "no two images get quite the same light"
     figures = "jitter"
     reason = "{0[0]:.2g} s and {0[1]:.2%} of the power from image to image"
-    cost_s_per_pixel = 1e-9
+    cost_s_per_pixel = 2e-10
 
     @classmethod
     def change(cls, conditions: Conditions, figures: _Some, seen: Glimpse) -> Values:
@@ -205,7 +206,7 @@ class HotPixels(_SomePixels):
     what = "some pixels fill up without light"
     figures = "hot_pixels"
     reason = "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons a second"
-    cost_s_per_pixel = 7e-10
+    cost_s_per_pixel = 2e-10
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
@@ -228,7 +229,7 @@ class NoisyPixels(_SomePixels):
     what = "some pixels are read with more noise"
     figures = "noisy_pixels"
     reason = "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons of further noise"
-    cost_s_per_pixel = 1.7e-9
+    cost_s_per_pixel = 1.5e-9
     adds_variance = True
 
     @staticmethod
@@ -274,7 +275,7 @@ class NonLinearity(_Fault, ImageEffect):
     what = "what is read lags behind the charge"
     figures = "non_linearity"
     reason = "{0:.2%} less at a full well"
-    cost_s_per_pixel = 3e-9
+    cost_s_per_pixel = 1.9e-9
 
     @classmethod
     def change(cls, conditions: Conditions, figures: float, seen: Glimpse) -> Values:

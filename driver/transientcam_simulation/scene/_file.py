@@ -228,10 +228,6 @@ def _device(table: Table, folder: Path | None) -> DeviceProfile:
     return table.done(replace(profile, **figures))
 
 
-def _pair(*figures: float) -> tuple[float, ...]:
-    return figures
-
-
 _SHARES = {"ghost": 0.5, "crosstalk": 0.8, "blooming": 0.9, "non_linearity": 0.5}
 _FIGURES: dict[str, Any] = {
     "drift": (
@@ -239,9 +235,9 @@ _FIGURES: dict[str, Any] = {
         ("delay_s_per_c", -MOST_S, MOST_S),
     ),
     "lens_scatter": (LensScatter, ("share", 0, 0.5), ("width", 1e-6, 1e6, 0.15)),
-    "jitter": (_pair, ("delay_s", 0, MOST_S, 0.0), ("power", 0, 0.3, 0.0)),
-    "hot_pixels": (_pair, ("share", 0, 1), ("electrons_per_s", 0, MOST_E)),
-    "noisy_pixels": (_pair, ("share", 0, 1), ("electrons", 0, 1e9)),
+    "jitter": (lambda *pair: pair, ("delay_s", 0, MOST_S, 0.0), ("power", 0, 0.3, 0.0)),
+    "hot_pixels": (lambda *pair: pair, ("share", 0, 1), ("electrons_per_s", 0, MOST_E)),
+    "noisy_pixels": (lambda *pair: pair, ("share", 0, 1), ("electrons", 0, 1e9)),
 }  # fmt: skip
 """Tables of a device: what they make, and the limits of numbers, and their defaults."""
 

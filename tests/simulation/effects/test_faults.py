@@ -349,3 +349,12 @@ def test_faults_of_a_scene_that_moves_come_in_every_image() -> None:
     assert not local["crosstalk"]
     assert not local["ghost"]
     assert not local["lens-scatter"]
+
+
+def test_what_is_done_once_costs_nothing_an_image() -> None:
+    device = replace(TYPICAL, name="ideal")
+    calls = world(30_000.0, device).calls(ONCE)
+    costs_s = {name: calls[name].cost_s for name in FAULTS}
+
+    once = {name for name, cost_s in costs_s.items() if cost_s == 0}
+    assert once == {"ghost", "crosstalk"}
