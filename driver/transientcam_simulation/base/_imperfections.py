@@ -84,6 +84,21 @@ class DarkCurrent:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherLight:
+    """How light that is not the camera's own changes; None where it does not.
+
+    A share of it that comes and goes at a frequency in Hz, as a cosine of the device's time; and
+    one of another camera's lamp, which is modulated at a frequency in Hz.
+    """
+
+    flicker: tuple[float, float] | None = None
+    other_camera: tuple[float, float] | None = None
+
+
+STEADY, TYPICAL_OTHER_LIGHT = OtherLight(), OtherLight((0.2, 100.0), (0.5, 23e6 + 60))
+
+
+@dataclass(frozen=True, slots=True)
 class Lens:
     """How a lens departs from a pinhole."""
 

@@ -22,12 +22,14 @@ from transientcam_simulation.effects._effect import (
 from transientcam_simulation.effects._faults import (
     Blooming,
     Crosstalk,
+    Flicker,
     Ghost,
     HotPixels,
     Jitter,
     LensScatter,
     NoisyPixels,
     NonLinearity,
+    OtherCamera,
 )
 from transientcam_simulation.effects._glimpses import Facts, Glimpse, Noise, Values
 from transientcam_simulation.effects._in_scene import (
@@ -69,9 +71,9 @@ NOISE = (ShotNoise, ReadNoise)
 
 EFFECTS: tuple[type[Effect], ...] = (
     Distortion, MirrorPaths, GlassPanes, Gloss, DiffuseInterreflection, Scattering, MixedPixels,
-    MotionDuringSequence, MotionBlur, ModulationHarmonics, AmbientLight, AmplitudeRollOff,
-    LensScatter, Ghost, Vignetting, Crosstalk, PixelPattern, DarkCurrentElectrons, ThermalDrift,
-    SynchronisationOutliers, Jitter, HotPixels, Blooming, Saturation, *NOISE, NoisyPixels,
-    NonLinearity, Quantisation,
+    MotionDuringSequence, MotionBlur, ModulationHarmonics, AmbientLight, Flicker, OtherCamera,
+    AmplitudeRollOff, LensScatter, Ghost, Vignetting, Crosstalk, PixelPattern,
+    DarkCurrentElectrons, ThermalDrift, SynchronisationOutliers, Jitter, HotPixels, Blooming,
+    Saturation, *NOISE, NoisyPixels, NonLinearity, Quantisation,
 )  # fmt: skip
 """In the order in which they happen."""

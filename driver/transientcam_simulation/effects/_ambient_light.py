@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from transientcam_simulation.base import STEADY
 from transientcam_simulation.effects._conditions import Call, Conditions, weigh
 from transientcam_simulation.effects._effect import LightPlanes, PlaneEffect
 
@@ -24,7 +25,7 @@ class AmbientLight(PlaneEffect):
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Where there is any whose shot noise counts."""
+        """Where there is any that changes, or whose shot noise counts."""
         if not conditions.ambient_e:
             return Call(False, "no light but the camera's", 0.0, 0.0)
         per_e = 2 / conditions.scale_e / math.sqrt(conditions.sequence.takes)
@@ -32,7 +33,8 @@ class AmbientLight(PlaneEffect):
             per_e * np.sqrt(conditions.white_e * each.reflectance) for each in conditions.glimpses
         )
         reason = f"{conditions.ambient_e:.0f} electrons in a typical pixel of each image"
-        return weigh(replace(conditions, white_e=0.0), noise, reason)
+        call = weigh(replace(conditions, white_e=0.0), noise, reason)
+        return replace(call, called=call.called or conditions.other_light != STEADY)
 
     @classmethod
     def forced_on(cls, conditions: Conditions) -> Conditions:

@@ -8,7 +8,7 @@ import numpy as np
 
 from transientcam_driver.camera import Sensor
 from transientcam_driver.sequence import LOW_FREQUENCY_HZ, Sequence, SubPhases
-from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens
+from transientcam_simulation.base import IDEAL, PINHOLE, STEADY, DeviceProfile, Lens, OtherLight
 from transientcam_simulation.effects._glimpses import Facts, Glimpse, Noise, Values
 
 CALLED_ABOVE = 0.1
@@ -37,6 +37,7 @@ class Conditions:
     scale_e: float
     glimpses: tuple[Glimpse, ...]
     white_e: float = 0.0
+    other_light: OtherLight = STEADY
     image_period_s: float = 0.0
     device: DeviceProfile = IDEAL
     lens: Lens = PINHOLE

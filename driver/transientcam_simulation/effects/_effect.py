@@ -16,7 +16,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.base import TYPICAL, standard_normal
+from transientcam_driver.sequence import ImageLabel
+from transientcam_simulation.base import TYPICAL, TYPICAL_OTHER_LIGHT, standard_normal
 from transientcam_simulation.effects._conditions import Call, Conditions
 
 Plane = NDArray[np.float32]
@@ -29,7 +30,7 @@ class LightPlanes:
 
     ``reflectance`` computes that of all pixels, (H, W) or one for all.
     An image at phase theta has ``constant + mean + sum_k Re(terms[k] exp(-i k theta))``, without
-    light only ``constant``.
+    light only ``constant``, of which ``dark`` comes without other light, too.
     """
 
     frequency_hz: float
@@ -38,6 +39,7 @@ class LightPlanes:
     reflectance: Callable[[], Plane | np.float32]
     mean: Plane
     terms: dict[int, NDArray[np.complex64]] = field(default_factory=dict)
+    dark: np.float32 = _NONE
 
     def move(self, share: float, moved: Callable[[NDArray[Any]], NDArray[Any]]) -> None:
         """Move a share of all light to other pixels; what is even stays so."""
@@ -57,16 +59,18 @@ class Shot:
 
     Two taps of one ``exposure`` have numbers of their own.
     ``delay_s`` is added to all times of flight; the modulated part is multiplied by ``factor``, all
-    of the camera's own light by ``power``.
+    of the camera's own light by ``power``, and other light by ``others``.
     """
 
     number: int
     device_time_s: float
     seed: int
     exposure: int
+    label: ImageLabel
     delay_s: float = 0.0
     factor: complex = 1.0
     power: float = 1.0
+    others: float = 1.0
 
 
 @dataclass(slots=True)
@@ -107,18 +111,21 @@ class NormalDraw(Stage):
 class Effect(ABC):
     """An effect, what it is in a few words, and whether a scene calls for it.
 
-    ``figures`` names the field of the device's profile that it depends on, if there is one. An
-    effect that is forced on where the device has no such figures takes typical ones.
+    ``figures`` names the field of the device's profile, or of what else is the ``holder``, that it
+    depends on, if there is one. An effect that is forced on where there are no such figures takes
+    typical ones.
     """
 
     name: ClassVar[str]
     what: ClassVar[str]
     optional: ClassVar[bool] = True
     figures: ClassVar[str] = ""
+    holder: ClassVar[str] = "device"
 
     def __init__(self, conditions: Conditions) -> None:
         self._sensor = conditions.sensor
-        self._figures: Any = getattr(conditions.device, self.figures) if self.figures else None
+        held = getattr(conditions, self.holder)
+        self._figures: Any = getattr(held, self.figures) if self.figures else None
 
     @classmethod
     @abstractmethod
@@ -128,11 +135,12 @@ class Effect(ABC):
     @classmethod
     def forced_on(cls, conditions: Conditions) -> Conditions:
         """Return conditions under which the effect exists."""
-        device = conditions.device
-        if not cls.figures or getattr(device, cls.figures) is not None:
+        held: Any = getattr(conditions, cls.holder)
+        if not cls.figures or getattr(held, cls.figures) is not None:
             return conditions
-        figures: dict[str, Any] = {cls.figures: getattr(TYPICAL, cls.figures)}
-        return replace(conditions, device=replace(device, **figures))
+        typical = TYPICAL if cls.holder == "device" else TYPICAL_OTHER_LIGHT
+        figures: dict[str, Any] = {cls.figures: getattr(typical, cls.figures)}
+        return replace(conditions, **{cls.holder: replace(held, **figures)})
 
 
 class LightEffect(Effect):

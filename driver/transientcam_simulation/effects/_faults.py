@@ -1,4 +1,4 @@
-"""Faults that a device may have: of its lamp, its lens and its pixels."""
+"""Faults that a device may have, of its lamp, lens and pixels; and other light that changes."""
 
 import math
 from abc import abstractmethod
@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.sequence import ImageLabel, Sequence
 from transientcam_simulation.base import LensScatter as Scattering
 from transientcam_simulation.effects._conditions import Call, Conditions, weigh
 from transientcam_simulation.effects._effect import (
@@ -27,13 +28,14 @@ _MOST_SPILLS = 64  # by then less than a hundredth is left
 
 
 class _Fault(Effect):
-    """One that is called for by how far the device's figures move moments.
+    """One that is called for by how far figures move moments.
 
-    ``reason`` is a format string of the figures. On planes a fault costs nothing where the scene
-    stands still.
+    ``reason`` is a format string of the figures, ``without`` what is said where there are none. On
+    planes a fault costs nothing where the scene stands still.
     """
 
     reason: ClassVar[str]
+    without: ClassVar[str] = "the device has no such fault"
     cost_s_per_pixel: ClassVar[float]
 
     @classmethod
@@ -43,10 +45,10 @@ class _Fault(Effect):
 
     @classmethod
     def called_for(cls, conditions: Conditions) -> Call:
-        """Where the device has the fault, and it moves moments far enough."""
-        figures = getattr(conditions.device, cls.figures)
+        """Where there are figures, and they move moments far enough."""
+        figures = getattr(getattr(conditions, cls.holder), cls.figures)
         if not figures:
-            return Call(False, "the device has no such fault", 0.0, 0.0)
+            return Call(False, cls.without, 0.0, 0.0)
         still = issubclass(cls, PlaneEffect) and not conditions.moves
         changes = tuple(cls.change(conditions, figures, each) for each in conditions.glimpses)
         drawn_s = 2e-5 if issubclass(cls, ShotEffect) else 0.0
@@ -288,6 +290,79 @@ class NonLinearity(_Fault, ImageEffect):
         signal, full = exposure.signal, np.float32(self._sensor.full_well_e)
         np.minimum(signal, full, out=signal)
         signal -= self._figures / full * signal**2
+
+
+class _ChangingLight(_Fault, ShotEffect):
+    """Other light, of which an image has more or less."""
+
+    holder = "other_light"
+    without = "no other light is so"
+    cost_s_per_pixel = 7e-10
+
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
+        self._sequence = conditions.sequence
+
+    @staticmethod
+    @abstractmethod
+    def more(sequence: Sequence, figures: _Some, label: ImageLabel, begin_s: float) -> complex:
+        """Return the share that an image of this label has more, by its real part."""
+
+    @classmethod
+    def change(cls, conditions: Conditions, figures: _Some, seen: Glimpse) -> Values:
+        """Return what it does to the worst moment, as a root mean square over when frames begin."""
+        left: dict[int, list[NDArray[np.complex128]]] = {}
+        for n, label in enumerate(conditions.sequence.labels):
+            if label.frequency_hz:  # not with the light on and off
+                begin_s = n * conditions.image_period_s
+                more = cls.more(conditions.sequence, figures, label, begin_s)
+                turned = np.exp(1j * label.phase_rad) * np.array([more, np.conj(more)])
+                left.setdefault(label.harmonic, []).append(turned)
+        # both signs count by half in the mean square of a real part
+        most = max(2 * float(np.linalg.norm(np.mean(each, axis=0))) for each in left.values())
+        return most * conditions.white_e / conditions.scale_e * seen.reflectance
+
+    def on_shot(self, shot: Shot) -> None:
+        """Change it."""
+        more = self.more(self._sequence, self._figures, shot.label, shot.device_time_s)
+        shot.others += more.real
+
+
+class Flicker(_ChangingLight):
+    """Lamps that come and go, averaged over an exposure."""
+
+    name = "flicker"
+    what = "lamps that flicker"
+    figures = "flicker"
+    reason = "{0[0]:.0%} of the other light comes and goes at {0[1]:g} Hz"
+
+    @staticmethod
+    def more(sequence: Sequence, figures: _Some, label: ImageLabel, begin_s: float) -> complex:
+        """Return what they have more on average over an exposure."""
+        (share, hz), exposure_s = figures, sequence.exposure_s
+        turn = 2j * np.pi * hz * (begin_s + exposure_s / 2)
+        return complex(share * np.sinc(hz * exposure_s) * np.exp(turn))
+
+
+class OtherCamera(_ChangingLight):
+    """The lamp of another camera, whose modulation beats with this one's."""
+
+    name = "other-camera"
+    what = "another camera's modulated light"
+    figures = "other_camera"
+    reason = "{0[0]:.0%} of the other light is modulated at {0[1]:.9g} Hz"
+
+    @staticmethod
+    def more(sequence: Sequence, figures: _Some, label: ImageLabel, begin_s: float) -> complex:
+        """Return what it brings to a correlation, part by part with its sub-phase."""
+        (share, hz), begun, total = figures, 0.0, 0j
+        beat_hz, parts = hz - label.frequency_hz, sequence.sub_phases
+        for weight, sub_rad in zip(parts.weights, parts.phases_rad, strict=True):
+            middle_s = begin_s + (begun + weight / 2) * sequence.exposure_s
+            turn = 2 * np.pi * beat_hz * middle_s + label.phase_rad + sub_rad
+            part = np.sinc(beat_hz * weight * sequence.exposure_s)
+            total, begun = total + weight * part * np.exp(1j * turn), begun + weight
+        return complex(share * total)
 
 
 def _random(*words: int) -> np.random.Generator:

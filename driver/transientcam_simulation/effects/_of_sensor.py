@@ -49,6 +49,7 @@ class DarkCurrentElectrons(PlaneEffect):
     def on_light(self, planes: LightPlanes) -> None:
         """Add them to the part without the camera's light."""
         planes.constant = planes.constant + self._electrons
+        planes.dark += self._electrons
 
 
 def _electrons(conditions: Conditions) -> float:

@@ -113,6 +113,7 @@ def world_of(
         seed=scene.seed if seed is None else seed,
         device=scene.device,
         ambient_electrons_per_s=scene.ambient_electrons_per_s,
+        other_light=scene.other_light,
         readout_s=readout_s,
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.compiled import IMAGE_KERNELS
-from transientcam_simulation.effects import LightPlanes
+from transientcam_simulation.effects import LightPlanes, Shot
 from transientcam_simulation.light import Region, View, holds
 
 Plane = NDArray[np.float32]
@@ -20,20 +20,24 @@ class Quadratures:
     constant: Plane | np.float32
     offset: Plane
     terms: tuple[tuple[int, Plane, Plane], ...]
+    dark: np.float32
 
     @classmethod
     def of(cls, planes: LightPlanes) -> "Quadratures":
         """Take planes apart; a copy of it has contiguous ones."""
         terms = tuple((k, term.real, term.imag) for k, term in planes.terms.items())
         dark = not np.ndim(planes.constant) and not planes.constant
-        return cls(planes.constant, planes.mean if dark else planes.mean + planes.constant, terms)
+        offset = planes.mean if dark else planes.mean + planes.constant
+        return cls(planes.constant, offset, terms, planes.dark)
 
-    def lit(self, phasors: dict[int, complex], power: float) -> Plane:
-        """Electrons of an image with the light on, which has this share of its power."""
-        electrons = self.at(phasors, illumination=True)
-        if power != 1:
+    def of_shot(self, phasors: dict[int, complex], shot: Shot) -> Plane:
+        """Electrons of an image with its own shares of the camera's and of other light."""
+        lit = shot.label.illumination
+        electrons, power = self.at(phasors, illumination=lit), shot.power if lit else 1.0
+        if (power, shot.others) != (1.0, 1.0):
             electrons *= np.float32(power)
-            electrons += np.float32(1 - power) * self.constant
+            electrons += np.float32(shot.others - power) * (self.constant - self.dark)
+            electrons += np.float32(1 - power) * self.dark
         return electrons
 
     def at(self, phasors: dict[int, complex], *, illumination: bool) -> Plane:
@@ -66,6 +70,7 @@ class Quadratures:
             np.copy(self.constant) if isinstance(self.constant, np.ndarray) else self.constant,
             self.offset.copy(),
             tuple((k, one.copy(), other.copy()) for k, one, other in self.terms),
+            self.dark,
         )
 
 

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import ExplainedEffect, Explanation, Sensor, Truth
 from transientcam_driver.sequence import ImageLabel, Sequence
-from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens, ask
+from transientcam_simulation.base import (
+    IDEAL,
+    PINHOLE,
+    STEADY,
+    DeviceProfile,
+    Lens,
+    OtherLight,
+    ask,
+)
 from transientcam_simulation.effects import (
     CALLED_ABOVE,
     EFFECTS,
@@ -91,7 +99,7 @@ class World:
     only.
     ``device``: imperfections of the camera.
     ``ambient_electrons_per_s``: electrons a second that other light gives a pixel that sees a white
-    surface.
+    surface, and ``other_light`` how it changes.
     ``readout_s``: time between two exposures.
     """
 
@@ -108,6 +116,7 @@ class World:
         seed: int,
         device: DeviceProfile = IDEAL,
         ambient_electrons_per_s: float = 0.0,
+        other_light: OtherLight = STEADY,
         readout_s: float = 0.0,
     ) -> None:
         self._scenery = scenery
@@ -117,6 +126,7 @@ class World:
         self._seed = seed
         self._device = device
         self._ambient_electrons_per_s = ambient_electrons_per_s
+        self._other_light = other_light
         self._readout_s = readout_s
         self._plan: _Plan | None = None
 
@@ -180,7 +190,7 @@ class World:
         """Electrons (H, W) of an image on average, before noise and the converter."""
         plan = self._configured()
         exposure = (number + self.taps - 1) // self.taps
-        shot = Shot(number, device_time_s, self._seed, exposure)
+        shot = Shot(number, device_time_s, self._seed, exposure, label)
         for effect in plan.on_shot:
             effect.on_shot(shot)
         return self._mean_e(plan, label, shot)
@@ -200,6 +210,7 @@ class World:
             scale_e=scale_e,
             glimpses=self._scenery.glimpses,
             white_e=self._ambient_electrons_per_s * sequence.exposure_s,
+            other_light=self._other_light,
             image_period_s=sequence.exposure_s + self._readout_s,
             device=self._device,
             lens=self._scenery.lens,
@@ -270,8 +281,7 @@ class World:
             at_s = time_s + (instant + 0.5) / plan.instants * plan.sequence.exposure_s
             light = self._quadratures(plan, label.harmonic, at_s)
             phasors = {k: complex(np.exp(1j * k * turn_rad)) * out_of_step for k, *_ in light.terms}
-            lit = label.illumination
-            seen.append(light.lit(phasors, shot.power) if lit else light.at({}, illumination=lit))
+            seen.append(light.of_shot(phasors, shot))
         plan.time_s = time_s + 0.5 * plan.sequence.exposure_s
         return seen[0] if len(seen) == 1 else np.array(seen).mean(axis=0)
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Final
 
 from transientcam_driver.camera import Sensor
-from transientcam_simulation.base import IDEAL
+from transientcam_simulation.base import IDEAL, STEADY
 from transientcam_simulation.light._transport import KEPT_PIXELS, SurfaceScenery
 from transientcam_simulation.scene import Scene
 
@@ -37,6 +37,7 @@ def shared_scenery(scene: Scene, *, width: int, height: int) -> SurfaceScenery:
         sensor=Sensor(),
         device=IDEAL,
         ambient_electrons_per_s=0.0,
+        other_light=STEADY,
         effects={},
         seed=1,
     )

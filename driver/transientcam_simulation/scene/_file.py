@@ -20,6 +20,7 @@ from transientcam_simulation.base import (
     Drift,
     Lens,
     LensScatter,
+    OtherLight,
     Outliers,
     Pattern,
     Scatter,
@@ -112,6 +113,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
     if sum(map(bool, (responses, surfaces, diffuser))) != 1:
         allowed = "given, or [[response]] or [diffuser] instead, but only one of them"
         raise top.error("surface", len(surfaces), allowed)
+    ambient_per_s, other_light = _ambient(top.table("ambient"))
     scene = Scene(
         name=name,
         description=description,
@@ -124,7 +126,8 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
         transport=_transport(top.table("transport")),
         responses=responses,
         diffuser=diffuser,
-        ambient_electrons_per_s=_ambient(top.table("ambient")),
+        ambient_electrons_per_s=ambient_per_s,
+        other_light=other_light,
         effects=_effects(top.table("effects")),
         seed=top.integer("seed", 1, least=0, most=2**63 - 1),
     )
@@ -279,8 +282,17 @@ def _transport(table: Table) -> Transport:
     )
 
 
-def _ambient(table: Table) -> float:
-    return table.done(table.number("electrons_per_s", 0.0, least=0, most=MOST_E))
+def _ambient(table: Table) -> tuple[float, OtherLight]:
+    """Read all other light, and by which shares of it it changes."""
+    of_lamps = table.number("electrons_per_s", 0.0, least=0, most=MOST_E)
+    depth = table.number("flicker", 0.0, least=0, most=1)
+    flicker_hz = table.number("flicker_hz", 100.0, least=1e-3, most=1e6)
+    of_camera = table.number("camera_electrons_per_s", 0.0, least=0, most=MOST_E)
+    camera_hz = table.number("camera_hz", None if of_camera else 1.0, least=1, most=1e12)
+    both = of_lamps + of_camera
+    flicker = (depth * of_lamps / both, flicker_hz) if depth and of_lamps else None
+    other_camera = (of_camera / both, camera_hz) if of_camera else None
+    return table.done((both, OtherLight(flicker, other_camera)))
 
 
 def _diffuser(top: Table) -> Diffuser | None:

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.camera import Lens as RealLens, Sensor
-from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens, Scatter
+from transientcam_simulation.base import (
+    IDEAL,
+    PINHOLE,
+    STEADY,
+    DeviceProfile,
+    Lens,
+    OtherLight,
+    Scatter,
+)
 from transientcam_simulation.scene._geometry import Points, Primitive, Rectangle
 from transientcam_simulation.scene._mesh import Mesh
 from transientcam_simulation.scene._motion import Motion, carried, speed_m_s
@@ -245,6 +253,7 @@ class Scene:
     responses: tuple[ResponseFile, ...] = ()
     diffuser: Diffuser | None = None
     ambient_electrons_per_s: float = 0.0
+    other_light: OtherLight = STEADY
     effects: dict[str, str] = field(default_factory=dict)
     seed: int = 1
 

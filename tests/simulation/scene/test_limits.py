@@ -78,6 +78,10 @@ diffuse_bounces = 1
 patches = 3
 [ambient]
 electrons_per_s = 1000.0
+flicker = 0.3
+flicker_hz = 100.0
+camera_electrons_per_s = 500.0
+camera_hz = 23e6
 [[surface]]
 kind = "diffuse"
 shape = "sphere"
