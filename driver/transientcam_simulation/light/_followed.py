@@ -41,17 +41,15 @@ class FollowedRays:
     of these rays sees does not.
 
     ``scene``: standing still, with a camera.
-    ``rays``: (H W, 3) through the pixels, if not through their centres.
+    ``own``: rays (H W, 3) through the pixels, if not those through their centres.
     """
 
-    def __init__(self, scene: Scene, rays: Points | None = None, /, *, width: int, height: int):
+    def __init__(self, scene: Scene, own: Points | None = None, /, *, width: int, height: int):
         assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
         self.scene = scene
         self.width, self.height = width, height
         self._camera = scene.camera
-        self.centres = (
-            camera_rays(self._camera, width=width, height=height) if rays is None else rays
-        )
+        self.centres = camera_rays(scene.camera, width=width, height=height) if own is None else own
         self._adding = threading.Lock()
         self._kept: dict[int, Within] = {}
 

@@ -336,7 +336,7 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
         speed_m_s = motion.speed_m_s + motion.turn_rad_s  # at 1 m from its centre
         if speed_m_s > SPEED_OF_LIGHT_M_S:
             longer = motion.period_s * speed_m_s / SPEED_OF_LIGHT_M_S
-            limit = f"of at least {longer:.3g}, or path_m is faster than light"
+            limit = f"of at least {longer:.3g}, or it is faster than light"
             raise table.error("period_s", motion.period_s, limit)
         table.done(motions)
     return motions

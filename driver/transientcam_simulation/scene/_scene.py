@@ -54,10 +54,8 @@ class Viewpoint:
     def at(self, time_s: float) -> "Viewpoint":
         """Return it where it stands and looks at a time."""
         points = np.array([self.position_m, self.look_at_m, self.position_m + self.up])
-        place_m, look_at_m, above_m = carried(self.motions, time_s, self.position_m, points)
-        return replace(
-            self, position_m=place_m, look_at_m=look_at_m, up=above_m - place_m, motions=()
-        )
+        eye_m, aim_m, above_m = carried(self.motions, time_s, self.position_m, points)
+        return replace(self, position_m=eye_m, look_at_m=aim_m, up=above_m - eye_m, motions=())
 
     def as_lens(self, light_m: Points, *, width: int, height: int) -> RealLens:
         """Return what a camera would report of this lens, and of a light at ``light_m``."""
