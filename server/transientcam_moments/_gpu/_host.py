@@ -99,9 +99,9 @@ class Device:
         if reason:
             raise DeviceUnavailable(self.wanted, reason)
 
-    def is_ready(self, m: int) -> bool:
-        """Say whether frames of an order have been found right; else that begins now."""
-        check = self._check("pass", m)
+    def is_ready(self, m: int, kind: str = "pass") -> bool:
+        """Say whether passes or a kernel of an order were found right; else that begins now."""
+        check = self._check(kind, m)
         return check.done() and not check.result() and not self._reason
 
     def prepare(
@@ -130,19 +130,16 @@ class Device:
             "refused": next(filter(None, [*checks, self._reason]), None),
         }
 
-    def kernel(self, name: str, m: int, *given: Any, wait: bool = True) -> Any:
+    def kernel(self, name: str, m: int, *given: Any) -> Any:
         """Compute what the kernel of that name does of the same arguments.
 
-        None where the device does not take them, or fails; nor, unless it may ``wait``, until
-        it has been found right with that kernel and order.
+        None where the device does not take them, fails, or is wrong with that kernel and order.
         """
         usual = name in ARRANGED and given[0].dtype == np.complex64
         if not usual or given[0].shape[1] < LEAST_PIXELS or m > _MOST_ROOTS or self._reason:
             return None
-        check = self._check(name, m)
-        if not (wait or check.done()) or check.result():
-            return None
-        return self._asked(self.frame, name, m, *given)
+        refused = self._check(name, m).result()
+        return None if refused else self._asked(self.frame, name, m, *given)
 
     def _asked(self, frame: Callable[..., Any], name: str, m: int, *given: Any) -> Any:
         wanted = asked(name, given)
@@ -313,21 +310,21 @@ class Choice:
     def __init__(self, device: Device | None, *, automatic: bool) -> None:
         self.device, self.automatic, self.race = device, automatic, Race()
 
-    def device_for(self, m: int) -> Device | None:
-        """Return the device for frames of an order, if there is one; may wait for its check."""
+    def device_for(self, m: int, kind: str = "pass") -> Device | None:
+        """Return the device for frames of an order, if there is one; "auto" waits for no check."""
         if self.device is None or m > _MOST_ROOTS:
             return None
         if not self.automatic:
             self.device.require(m)
             return self.device
-        return self.device if self.device.is_ready(m) else None
+        return self.device if self.device.is_ready(m, kind) else None
 
     def kernel(self, name: str, m: int, *given: Any, here: Callable[[], Any]) -> Any:
         """Compute what a kernel does where that is chosen; has the face of `Elsewhere`."""
-        device = self.device_for(m) if name in ARRANGED else None
+        device = self.device_for(m, name) if name in ARRANGED else None
         if device is None:
             return here()
-        there = partial(device.kernel, name, m, *given, wait=not self.automatic)
+        there = partial(device.kernel, name, m, *given)
         rival = lookup(name, m, given[0].shape[1]) or not Key.of(name, m, "f").is_offered
         if self.automatic and rival:  # alike are those of about the same size
             sizes = (np.size(each).bit_length() for each in given)

@@ -1,6 +1,7 @@
 """Tests of films and integrals of densities, with a software device in the place of kernels."""
 
 from collections.abc import Iterator
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -178,6 +179,25 @@ def test_a_reconstruction_has_its_films_from_its_device(
     assert film.shape == (9, 20, 20)
     assert np.allclose(film, here.density(time_s), rtol=1e-2)
     assert np.allclose(light, here.cumulative(time_s), atol=1e-4 * here.brightness.max())
+
+
+def test_auto_races_films_once_they_are_found_right(
+    device: CountingDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    c = tm.levinson(of_films.varied_moments(2, np.complex64))
+    choice, checked = _gpu.Choice(device, automatic=True), Future[str]()
+    monkeypatch.setitem(device._checks, ("cumulative", 2), checked)
+    before = device.frames
+
+    with elsewhere(choice.kernel):
+        for _ in range(8):
+            tm.cumulative(c, np.ones(3))
+        assert device.frames == before
+        checked.set_result("")
+        for _ in range(6):
+            tm.cumulative(c, np.ones(3))
+
+    assert device.frames == before + 3
 
 
 def test_calls_use_what_was_said_once(
