@@ -143,7 +143,7 @@ def described(explanation: Explanation) -> str:
 def _lines(each: ExplainedEffect) -> list[str]:
     """Say what an effect is, how large, at what cost, by whose choice, and why."""
     size = f"{_figure(each.relative)} x the noise, at most {_figure(each.worst)} x"
-    cost = f"; {each.cost_s * 1e3:.2g} ms a frame" if each.cost_s else "; no time a frame"
+    cost = f"; {_figure(each.cost_s * 1e3)} ms a frame" if each.cost_s else "; no time a frame"
     choice = f"; switched {each.choice}" if each.choice in ("on", "off") else ""
     return [
         *textwrap.wrap(f"  {each.effect}: {each.what}", _COLUMNS, subsequent_indent="      "),

@@ -76,6 +76,11 @@ class Facts(Protocol):
         """Highest speed of any surface, in pixels."""
         ...
 
+    @property
+    def carried_past(self) -> int:
+        """How many surfaces a camera or a lamp that moves is carried past; 0 where none does."""
+        ...
+
     def changes(
         self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
     ) -> tuple[Values, ...]:

@@ -8,6 +8,7 @@ from transientcam_simulation.effects._effect import LightEffect
 
 _MIXED_COST_S_PER_PIXEL = 3e-9  # only where the scene moves, else it is done once
 _MOTION_COST_S_PER_PIXEL = 8e-8
+_CARRIED_COST_S_PER_PIXEL = 5e-7  # and surface, of a camera or a lamp that moves
 
 
 class _InGeometry(LightEffect):
@@ -114,7 +115,12 @@ class MotionDuringSequence(_InGeometry):
     @classmethod
     def cost_s(cls, conditions: Conditions) -> float:
         """Return that of light at a time of its own."""
-        return conditions.pixels * _MOTION_COST_S_PER_PIXEL
+        return _instant_s(conditions)
+
+
+def _instant_s(conditions: Conditions) -> float:
+    surfaces = conditions.facts.carried_past if conditions.facts else 0
+    return conditions.pixels * (_MOTION_COST_S_PER_PIXEL + surfaces * _CARRIED_COST_S_PER_PIXEL)
 
 
 class MotionBlur(_InGeometry):
@@ -141,7 +147,7 @@ class MotionBlur(_InGeometry):
     @classmethod
     def cost_s(cls, conditions: Conditions) -> float:
         """Return that of light at further times."""
-        return (cls.instants - 1) * conditions.pixels * _MOTION_COST_S_PER_PIXEL
+        return (cls.instants - 1) * _instant_s(conditions)
 
 
 class DiffuseInterreflection(LightEffect):

@@ -1,8 +1,10 @@
 """What a scene has and the simulation cannot make: judged as effects are, but never built."""
 
+import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from pathlib import Path
+from typing import Final, NamedTuple
 
 from transientcam_simulation.effects._conditions import Call, Conditions, weigh
 
@@ -15,22 +17,8 @@ class Missing(NamedTuple):
     reason: str
 
 
-MISSING = [
-    Missing(*each.split(" | "))
-    for each in (
-        "mirrors-between | light over a mirror from one surface to another where some move | "
-        "mirrors show {share} of the pixels' surfaces other lit ones",
-        "gloss-of-surroundings | gloss that reflects more than the lamp where some move, or "
-        "the lamp from curved surfaces to others | "
-        "gloss sends on light of surfaces, or to surfaces, in {share} of the pixels",
-        "further-bounces | light over more surfaces than the scene's file lets it go | "
-        "its transport.diffuse_bounces leaves out too much in {share} of the pixels",
-        "between-meshes | light that a mesh and other surfaces, or its parts, give each other | "
-        "it brings too much in {share} of the pixels",
-        "coarse-patches | light that surfaces give each other, where it changes within a patch | "
-        "patches are too coarse in {share} of the pixels; more transport.patches may help",
-    )
-]
+_FILE: Final = Path(__file__).with_name("missing.toml")
+MISSING = [Missing(name, **of) for name, of in tomllib.loads(_FILE.read_text("utf-8")).items()]
 
 
 def missing_calls(conditions: Conditions) -> Iterator[tuple[Missing, Call]]:

@@ -150,43 +150,24 @@ class SceneFacts:
     def _changes(
         self, effect: str, frequencies_hz: tuple[float, ...], during_s: float
     ) -> tuple[Values, ...]:
-        surfaces, there = self._scene.surfaces, self._seen
-        straight = (
-            replace(k.scene, camera=replace(camera_of(k.scene), lens=PINHOLE)) for k in there
-        )
-        variants: dict[str, tuple[bool, Callable[[], list[list[_SampledView]]]]] = {
-            "mirror-paths": (
-                bool(self._scene.mirrors),
-                lambda: [[self._look(without_mirrors(each.scene)) for each in there]],
-            ),
-            "glass": (
-                bool(self._scene.panes),
-                lambda: [[self._look(without_glass(each.scene)) for each in there]],
-            ),
-            "gloss": (
-                any(each.gloss for each in surfaces),
-                lambda: [[self._look(without_gloss(each.scene)) for each in there]],
-            ),
-            "scattering": (
-                any(each.scatter for each in surfaces),
-                lambda: [[replace(each, sharp=True) for each in there]],
-            ),
-            "mixed-pixels": (
-                True,
-                lambda: [[self._look(each.scene, self._within) for each in there]],
-            ),
-            "distortion": (
-                self._camera.lens.bends,
-                lambda: [[self._look(each) for each in straight]],
-            ),
+        scene, look = self._scene, self._look
+        glossy = any(each.gloss for each in scene.surfaces)
+        scatters = any(each.scatter for each in scene.surfaces)
+        variants: dict[str, tuple[bool, Callable[[_SampledView], _SampledView]]] = {
+            "mirror-paths": (bool(scene.mirrors), lambda at: look(without_mirrors(at.scene))),
+            "glass": (bool(scene.panes), lambda at: look(without_glass(at.scene))),
+            "gloss": (glossy, lambda at: look(without_gloss(at.scene))),
+            "scattering": (scatters, lambda at: replace(at, sharp=True)),
+            "mixed-pixels": (True, lambda at: look(at.scene, self._within)),
+            "distortion": (self._camera.lens.bends, lambda at: look(_straight(at.scene))),
         }
         if effect == "motion":  # which depends on the sequence
             return self._moved(frequencies_hz, during_s) if self._scene.moves else ()
-        happens, others = variants[effect]
+        happens, other = variants[effect]
         if not happens:
             return ()
         if effect not in self._left_out:
-            self._left_out[effect] = others()
+            self._left_out[effect] = [[other(each) for each in self._seen]]
         apart = self._apart(self._left_out[effect], frequencies_hz)
         if effect == "gloss" and not self._scene.moves and self._further_light:
             seen, (direct,) = self._seen[0], apart
@@ -262,6 +243,11 @@ class SceneFacts:
     @property
     def _pixel_rad(self) -> float:
         return math.radians(self._camera.field_of_view_deg) / self._size[0]
+
+    @property
+    def carried_past(self) -> int:
+        """How many surfaces a camera or a lamp that moves is carried past; 0 where none does."""
+        return len(self._scene.surfaces) if self._scene.carriers else 0
 
     @property
     def pixels_per_s(self) -> float:
@@ -404,3 +390,7 @@ def cosine_to_axis(camera: Viewpoint, rays: Points) -> Values:
     axis = forward + 2 * half_width * (x * right + y * down)
     cosine: Values = rays @ (axis / np.linalg.norm(axis))
     return cosine
+
+
+def _straight(scene: Scene) -> Scene:
+    return replace(scene, camera=replace(camera_of(scene), lens=PINHOLE))

@@ -25,7 +25,14 @@ LONGEST_S: Final = 1e3
 """Any capture has come by then."""
 
 _WORDS: Final = tomllib.loads(Path(__file__).with_name("quantities.toml").read_text("utf-8"))
-QUANTITIES: Final = {name: words.format(outlier_m=OUTLIER_M) for name, words in _WORDS.items()}
+
+
+def words_of(part: str, **constants: float) -> dict[str, str]:
+    """Return what the quantities of a part are, by their names."""
+    return {name: words.format(**constants) for name, words in _WORDS[part].items()}
+
+
+QUANTITIES: Final = words_of("captures", outlier_m=OUTLIER_M)
 """What is measured, for the page."""
 
 

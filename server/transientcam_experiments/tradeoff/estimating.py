@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_experiments.tradeoff.capture import OUTLIER_M
+from transientcam_experiments.tradeoff.capture import OUTLIER_M, words_of
 from transientcam_moments.comparisons import PLUGINS, TECHNIQUES, Technique, separated
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD
 
@@ -20,14 +20,7 @@ SAMPLE_PIXELS: Final = 96
 ENOUGH_S: Final = 0.5
 """Techniques that take longer are timed once."""
 
-QUANTITIES: Final[dict[str, str]] = {
-    "seconds": "computing time of one frame, median; of techniques that go pixel by pixel, "
-    f"that of {SAMPLE_PIXELS} pixels, multiplied",
-    "range_median_m": f"median absolute error of the range, {SAMPLE_PIXELS} lit pixels",
-    "range_p90_m": "error of the range that nine of ten of them stay below",
-    "range_outliers": f"share of them off by more than {OUTLIER_M:g} m",
-    "range_missing": "share of them without a range",
-}
+QUANTITIES: Final = words_of("estimators", sample_pixels=SAMPLE_PIXELS, outlier_m=OUTLIER_M)
 """What is measured, for the page."""
 
 

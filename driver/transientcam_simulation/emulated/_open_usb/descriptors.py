@@ -24,22 +24,11 @@ _MS_OS_20_UUID = bytes.fromhex("DF60DDD88945C74C9CD2659D9E648A9F")
 _INTERFACE_GUID = "{5B8A3C8E-2D7B-4E57-9D2C-61D0C6A3F0B4}"
 
 DEVICE_DESCRIPTOR = struct.pack(
-    "<BBHBBBBHHHBBBB",
-    18,
-    DEVICE,
+    "<BBHBBBBHHHBBBB", 18, DEVICE,
     0x0210,  # bcdUSB: a BOS descriptor exists
-    0,  # class of each interface
-    0,
-    0,
-    64,
-    VENDOR_ID,
-    PRODUCT_ID,
-    0x0100,
-    _MANUFACTURER,
-    _PRODUCT,
-    _SERIAL,
-    1,
-)
+    0, 0, 0,  # class of each interface
+    64, VENDOR_ID, PRODUCT_ID, 0x0100, _MANUFACTURER, _PRODUCT, _SERIAL, 1,
+)  # fmt: skip
 
 _ENDPOINT_DESCRIPTOR = struct.pack("<BBBBHB", 7, ENDPOINT, IMAGE_ENDPOINT, 2, MAX_PACKET_BYTES, 0)
 _INTERFACE_DESCRIPTOR = struct.pack("<BBBBBBBBB", 9, INTERFACE, 0, 0, 1, VENDOR_CLASS, 0, 0, 0)

@@ -35,23 +35,12 @@ CALIBRATION: Final = tuple(
     for code, offset_mm in enumerate((8123, 8123, 8143, 8153, 8163, 8173))
 )
 """All invented, but for the frequencies; the same as in the recorded session."""
-_IGNORED: Final = frozenset(
-    {
-        Command.STOP_STREAM,
-        Command.SET_FILTER,
-        Command.SET_HDR,
-        Command.SET_BINNING,
-        28,  # compensations
-        29,  # step of the delay line
-        39,  # light for grayscale images
-        51,  # segments of the illuminator
-        54,  # jitter
-        59,  # type of triggered images
-        60,  # rolling mode
-        61,  # eye safety
-    }
-)
-"""Accepted without effect."""
+_NAMED: Final = (Command.STOP_STREAM, Command.SET_FILTER, Command.SET_HDR, Command.SET_BINNING)
+_IGNORED: Final = frozenset((*_NAMED, 28, 29, 39, 51, 54, 59, 60, 61))
+"""Accepted without effect; the others are compensations, the step of the delay line, light for
+grayscale images, segments of the illuminator, jitter, the type of triggered images, rolling mode,
+and eye safety.
+"""
 
 _CONSTANT: Final[dict[int, bytes]] = {
     Command.READ_FIRMWARE: pack_answer(AnswerType.FIRMWARE, struct.pack("!HH", *FIRMWARE)),
