@@ -9,7 +9,7 @@ import numpy as np
 
 from transientcam_moments._dispatch import PLANAR
 from transientcam_moments._gpu._passes import KEYS
-from transientcam_moments._gpu._shader import ENTRY, head
+from transientcam_moments._gpu._shader import entry, head
 from transientcam_moments._gpu._tracing import VECTOR, Complex, Planes, Writer
 from transientcam_moments.arrays import Array, parts
 from transientcam_moments.likelihood import planar, scaled
@@ -94,7 +94,7 @@ def _cumulative(m: int) -> _Text:
 def kernel_shader(name: str, m: int, *variant: Any, hostile: bool = False) -> str:
     """Return the shader of a kernel of an order; of a likelihood, for returns and shapes."""
     text: _Text = globals()[f"_{name}"](m, *variant)
-    return head(hostile=hostile) + ENTRY % ("estimate", "\n".join(text.lines))
+    return head(hostile=hostile) + entry("estimate", "\n".join(text.lines))
 
 
 class Asked(NamedTuple):

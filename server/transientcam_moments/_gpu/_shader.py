@@ -6,6 +6,7 @@ traced from the functions that state it (`_tracing`). One thread does one pixel.
 
 from functools import lru_cache
 from pathlib import Path
+from string import Template
 from typing import Any, Final
 
 import numpy as np
@@ -29,22 +30,21 @@ PLANES: Final = (
 ZEROTH: Final = {"low-frequency": 4, "on-off": 2, "estimated": 0}
 NON_FINITE: Final = 8
 
-ENTRY = f"""
-@compute @workgroup_size({GROUP})
-fn %s(@builtin(global_invocation_id) id: vec3<u32>) {{
-  let pixels = params.width * params.height;
-  let p = id.y * {ROW}u + id.x;
-  if (p >= pixels) {{ return; }}
-%s
-}}
-"""
+
+def _written(part: str, /, **words: object) -> str:
+    """Return what is written by hand, with words put in."""
+    text = Path(__file__).with_name(f"{part}.wgsl").read_text("utf-8")
+    return Template(text).substitute(words)
+
+
+def entry(name: str, lines: str) -> str:
+    """Return an entry that runs lines for each pixel."""
+    return _written("entry", name=name, lines=lines, group=GROUP, row=ROW)
 
 
 def head(*, hostile: bool) -> str:
     """Return what all shaders begin with: bindings, and words that stand for no operator."""
-    names = "head", "hostile" if hostile else "plain"
-    files = (Path(__file__).with_name(f"{name}.wgsl") for name in names)
-    return "".join(file.read_text("utf-8") for file in files)
+    return _written("head") + _written("hostile" if hostile else "plain")
 
 
 @lru_cache(maxsize=32)
@@ -58,10 +58,10 @@ def shader(m: int, zeroth: str | None, *, images: bool, hostile: bool = False) -
     """
     found = head(hostile=hostile)
     if images and zeroth is not None:
-        found += ENTRY % ("measure", _measured(m, zeroth))
+        found += entry("measure", _measured(m, zeroth))
     estimated = zeroth == "estimated"
     here = _smoothed(m, estimated=estimated, kept=images) + _analysed(m, estimated=estimated)
-    return found + ENTRY % ("analyse", here)
+    return found + entry("analyse", here)
 
 
 def rows(m: int, *, images: bool) -> int:
@@ -110,20 +110,7 @@ def _smoothed(m: int, *, estimated: bool, kept: bool) -> str:
     lines = ["let norm = weights[p];", "var sound = finite(norm);"]
     lines += [f"var b{j} = vec2<f32>(0.0, 0.0);" for j in range(m + 1)]
     sums = "\n".join(f"b{j} += weight * moments[{j}u * pixels + at];" for j in range(m + 1))
-    lines.append(f"""
-    let radius = i32(params.radius);
-    let here = vec2<i32>(i32(p % params.width), i32(p / params.width));
-    for (var dy = -radius; dy <= radius; dy++) {{
-      let y = here.y + dy;
-      if (y < 0 || y >= i32(params.height)) {{ continue; }}
-      for (var dx = -radius; dx <= radius; dx++) {{
-        let x = here.x + dx;
-        if (x < 0 || x >= i32(params.width)) {{ continue; }}
-        let weight = weights[pixels + u32(dy + radius)] * weights[pixels + u32(dx + radius)];
-        let at = u32(y) * params.width + u32(x);
-        {sums}
-      }}
-    }}""")
+    lines.append(_written("smoothing", sums=sums))
     if estimated:
         lines.append("b0 = vec2<f32>(0.0, 0.0);")
     for j in range(m + 1):

@@ -246,10 +246,16 @@ _BRIGHTNESS = wire.array_document(np.ones((2, 3), "<f4"))
             {"encoding": "reflection16", "brightness": wire.array_document(np.ones((3, 2), "<f4"))},
             "brightness.shape",
         ),
-        (
-            _PLANES,
-            {"encoding": "reflection16", "brightness": wire.array_document(np.ones((2, 3), "<f8"))},
-            "brightness.shape",
+        *(
+            (
+                _PLANES,
+                {
+                    "encoding": "reflection16",
+                    "brightness": wire.array_document(np.ones((2, 3), each)),
+                },
+                "brightness.shape",
+            )
+            for each in sorted(set(wire.DTYPES) - {"<f4"})
         ),
         (_PLANES[:0], {"encoding": "reflection16", "brightness": _BRIGHTNESS}, "array.shape"),
     ],
