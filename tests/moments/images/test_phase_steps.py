@@ -37,6 +37,18 @@ def test_of_noisy_images_they_are_the_least_squares(phase: np.ndarray) -> None:
     assert phase_weights(phase) @ image == pytest.approx(real + 1j * imaginary)
 
 
+@pytest.mark.parametrize(
+    "quarters", [[0, 1, 2], [1, 2, 3], [3, 2, 1], [0, 1, 2, 2], [0, 1, 2, 3, 3], [0, 1, 2, 3, 0, 2]]
+)
+def test_some_quarters_of_a_turn_have_the_weights_of_least_squares(quarters: list[int]) -> None:
+    phase = np.pi / 2 * np.array(quarters)
+    model = np.stack([np.cos(phase) / 2, np.sin(phase) / 2, np.ones(len(phase))], axis=1)
+    image = RNG.normal(size=len(phase))
+    (real, imaginary, _), *_ = np.linalg.lstsq(model, image)
+
+    assert phase_weights(phase) @ image == pytest.approx(real + 1j * imaginary)
+
+
 @pytest.mark.parametrize("count", [3, 4, 5, 6, 16])
 def test_equidistant_phases_have_the_weights_of_a_fourier_transform(count: int) -> None:
     phase = 2 * np.pi * np.arange(count) / count

@@ -56,3 +56,16 @@ def test_a_step_that_does_not_help_is_not_taken() -> None:
     assert size(residual(b, *found), b) <= before
     assert np.isfinite(found[0]).all()
     assert np.all(found[1] > 0)
+
+
+def test_weights_that_are_off_alone_are_right_after_one_solution() -> None:
+    """They are linear in the moments, however far off they are: Newton's method need not begin."""
+    rng = np.random.default_rng(2)
+    phase, weight = oracles.random_returns(rng, returns=3, pixels=40, apart_rad=0.5)
+    b = oracles.moments_of_returns(phase, weight, 3)
+
+    off = weight * rng.uniform(0.2, 5, weight.shape)
+    found = polish(b, phase, off, np.zeros(40), tolerance=1e-9)
+
+    assert np.array_equal(found[0], phase)
+    assert np.abs(found[1] / weight - 1).max() < 1e-9

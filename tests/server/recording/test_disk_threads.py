@@ -103,6 +103,26 @@ def test_a_disk_that_is_only_slow_is_waited_for(gate: Gate) -> None:
     threads.close()
 
 
+def test_work_has_waited_since_the_first_of_it_began(gate: Gate) -> None:
+    now_s = [1000.25]
+    threads = DiskThreads(stalled_s=60.0, clock=lambda: now_s[0])
+
+    async def wait_for_two() -> None:
+        first = asyncio.create_task(threads.run(gate.pass_through, 1))
+        await asyncio.to_thread(wait_until, lambda: gate.waiting == 1)
+        now_s[0] += 2.5
+        second = asyncio.create_task(threads.run(gate.pass_through, 2))
+        await asyncio.to_thread(wait_until, lambda: gate.waiting == 2)
+        now_s[0] += 2.0
+        assert threads.waiting_s == 4.5
+        gate.opened.set()
+        await asyncio.gather(first, second)
+
+    asyncio.run(wait_for_two())
+    assert threads.waiting_s == 0.0
+    threads.close()
+
+
 def test_work_is_done_as_whoever_accounts_for_it_has_it(threads: DiskThreads) -> None:
     threads.around = lambda work: lambda: (work(), "counted")
 
