@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,9 @@ from transientcam_driver.camera import Sensor
 from transientcam_driver.errors import SceneError
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.texts import read_text
-from transientcam_simulation.base import (
-    PROFILES,
-    DarkCurrent,
-    DeviceProfile,
-    Drift,
-    Lens,
-    LensScatter,
-    OtherLight,
-    Outliers,
-    Pattern,
-    Scatter,
-    Waveform,
-)
+from transientcam_simulation.base import Lens, OtherLight, Scatter
 from transientcam_simulation.effects import CHOICES, EFFECTS
+from transientcam_simulation.scene._device import MOST_E, MOST_S, read_device
 from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle, rotation
 from transientcam_simulation.scene._limits import require_modest
 from transientcam_simulation.scene._mesh import Mesh
@@ -50,10 +39,8 @@ from transientcam_simulation.scene._table import MOST_M, Table
 
 BUILT_IN = Path(__file__).parents[1] / "scenes"
 MOST_BOUNCES = 8
-LEAST_E, MOST_E = 1e-9, 1e15
-"""Electrons a second: with them and what the light falls on, no number is out of bounds."""
-MOST_S = 1e-3
-"""Of a delay."""
+LEAST_E = 1e-9
+"""Electrons a second, as `MOST_E`."""
 _FORMER_DIFFUSER = "diffusor"
 """How the table [diffuser] was spelt."""
 _SHAPES = ("rectangle", "sphere", "ellipsoid", "mesh")
@@ -120,7 +107,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
         file=file,
         light=_light(top.table("light"), motions, somewhere=bool(surfaces)),
         sensor=_sensor(top.table("sensor")),
-        device=_device(top.table("device"), folder),
+        device=read_device(top.table("device"), folder),
         camera=_viewpoint(top.table("camera"), motions) if surfaces else None,
         surfaces=tuple(part for surface in surfaces for part in (surface, *_dust(surface))),
         transport=_transport(top.table("transport")),
@@ -207,79 +194,13 @@ def _sensor(table: Table) -> Sensor:
     return table.done(sensor)
 
 
-def _device(table: Table, folder: Path | None) -> DeviceProfile:
-    profile = PROFILES[table.choice("profile", tuple(PROFILES), "ideal")]
-    profile = replace(profile, seed=table.integer("seed", 0, least=0, most=2**63 - 1))
-    if "waveform_file" in table:
-        profile = replace(profile, waveform=Waveform(file=_file(table, "waveform_file", folder)))
-    if "pattern" in table:
-        profile = replace(profile, pattern=_pattern(table.table("pattern"), folder))
-    if "dark_current_e_per_s" in table:
-        current = DarkCurrent(table.number("dark_current_e_per_s", least=0, most=MOST_E))
-        profile = replace(profile, dark_current=current)
-    if "outlier_share" in table:
-        share = table.number("outlier_share", least=0, most=1)
-        profile = replace(profile, outliers=Outliers(share))
-    figures: dict[str, Any] = {
-        key: table.number(key, least=0, most=most) for key, most in _SHARES.items() if key in table
-    }
-    for key, (kind, *limits) in _FIGURES.items():
-        if key in table:
-            own = table.table(key)
-            read = [own.number(name, *of, least=n, most=m) for name, n, m, *of in limits]
-            figures[key] = own.done(kind(*read))
-    return table.done(replace(profile, **figures))
-
-
-_SHARES = {"ghost": 0.5, "crosstalk": 0.8, "blooming": 0.9, "non_linearity": 0.5}
-_FIGURES: dict[str, Any] = {
-    "drift": (
-        Drift, ("rise_c", -1e4, 1e4), ("time_constant_s", 1e-6, 1e9),
-        ("delay_s_per_c", -MOST_S, MOST_S),
-    ),
-    "lens_scatter": (LensScatter, ("share", 0, 0.5), ("width", 1e-6, 1e6, 0.15)),
-    "jitter": (lambda *pair: pair, ("delay_s", 0, MOST_S, 0.0), ("power", 0, 0.3, 0.0)),
-    "hot_pixels": (lambda *pair: pair, ("share", 0, 1), ("electrons_per_s", 0, MOST_E)),
-    "noisy_pixels": (lambda *pair: pair, ("share", 0, 1), ("electrons", 0, 1e9)),
-}  # fmt: skip
-"""Tables of a device: what they make, and the limits of numbers, and their defaults."""
-
-
-def _pattern(table: Table, folder: Path | None) -> Pattern:
-    pattern = Pattern(
-        delay_s=table.number("delay_s", 0.0, least=0, most=MOST_S),
-        gain=table.number("gain", 0.0, least=0, most=0.3),
-        file=_file(table, "file", folder) if "file" in table else None,
-        file_frequency_hz=table.number("file_frequency_hz", 23e6, least=1, most=1e12),
-    )
-    if pattern.file is not None and pattern.delay_s:
-        raise table.error("delay_s", pattern.delay_s, "absent beside file, which has the delays")
-    return table.done(pattern)
-
-
-def _file(table: Table, key: str, folder: Path | None) -> Path:
-    """Read the name of a file beside the scene's own."""
-    name = table.text(key)
-    if folder is None:
-        raise table.error(key, name, "absent: a scene that is sent cannot name files")
-    return folder / name
-
-
 def _transport(table: Table) -> Transport:
-    default = Transport()
-    return table.done(
-        Transport(
-            mirror_bounces=table.integer(
-                "mirror_bounces", default.mirror_bounces, least=0, most=MOST_BOUNCES
-            ),
-            diffuse_bounces=(
-                table.integer("diffuse_bounces", least=0, most=MOST_BOUNCES)
-                if "diffuse_bounces" in table
-                else None
-            ),
-            patches=table.integer("patches", default.patches, least=2, most=64),
-        )
-    )
+    default, most = Transport(), MOST_BOUNCES
+    mirror = table.integer("mirror_bounces", default.mirror_bounces, least=0, most=most)
+    given = "diffuse_bounces" in table
+    diffuse = table.integer("diffuse_bounces", least=0, most=most) if given else None
+    patches = table.integer("patches", default.patches, least=2, most=64)
+    return table.done(Transport(mirror, diffuse, patches))
 
 
 def _ambient(table: Table) -> tuple[float, OtherLight]:
@@ -391,7 +312,7 @@ def _shape(table: Table, kind: Kind, folder: Path | None) -> tuple[Shape, float 
 
 
 def _mesh(table: Table, folder: Path | None) -> tuple[Mesh, float | None]:
-    mesh, coloured = load_mesh(_file(table, "file", folder), smooth=table.switch("smooth", True))
+    mesh, coloured = load_mesh(table.beside("file", folder), smooth=table.switch("smooth", True))
     scale = table.number("scale", 1.0, least=1e-9, most=1e9)
     position_m = table.vector("position_m", (0.0, 0.0, 0.0))
     turn = rotation(table.vector("rotation_deg", (0.0, 0.0, 0.0)))
@@ -458,12 +379,12 @@ def _response(table: Table, folder: Path | None) -> ResponseFile:
         table.number("time_zero_s", least=-MOST_S, most=MOST_S) if "time_zero_s" in table else None
     )
     has_zero_file = "time_zero_file" in table
-    zero_file = _file(table, "time_zero_file", folder) if has_zero_file else None
+    zero_file = table.beside("time_zero_file", folder) if has_zero_file else None
     if time_zero_s is not None and zero_file is not None:
         raise table.error("time_zero_s", time_zero_s, "absent beside time_zero_file")
     return table.done(
         ResponseFile(
-            path=_file(table, "file", folder),
+            path=table.beside("file", folder),
             weight=table.number("weight", 1.0, least=1e-9, most=1e9),
             delay_s=table.number("delay_s", 0.0, least=-MOST_S, most=MOST_S),
             normalise=table.switch("normalise", True),

@@ -54,6 +54,13 @@ class Table:
             raise self.error(key, value, "a text")
         return value
 
+    def beside(self, key: str, folder: Path | None) -> Path:
+        """Read the name of a file beside the scene's own, in its folder."""
+        name = self.text(key)
+        if folder is None:
+            raise self.error(key, name, "absent: a scene that is sent cannot name files")
+        return folder / name
+
     def choice(self, key: str, allowed: tuple[str, ...], default: str | None = None) -> Any:
         """Read one of a few words; the caller gives the result its type."""
         value = self._take(key, default)
