@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -26,26 +27,14 @@ DEPTH: Final = "viridis"
 """Of ranges and times."""
 SIGNED: Final = "PuOr"
 """Of what may be negative."""
-_RC: Final[dict[str, Any]] = {
-    "font.size": 9.0,
-    "axes.titlesize": 9.5,
-    "axes.labelsize": 9.0,
-    "legend.fontsize": 8.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "lines.linewidth": 1.6,
-    "image.interpolation": "nearest",
-    "svg.hashsalt": "transientcam",
-}
+_STYLE: Final = Path(__file__).with_name("paper.mplstyle")
 _DPI = 110
 
 
 @contextmanager
 def new(width_in: float, height_in: float) -> Iterator[Figure]:
     """Give an empty picture that needs no display, and what is drawn inside its looks."""
-    with rc_context(_RC):  # type: ignore[arg-type]  # its keys are typed one by one
+    with rc_context(fname=_STYLE):
         picture = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(picture)
         yield picture
