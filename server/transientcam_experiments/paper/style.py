@@ -20,7 +20,6 @@ OURS: Final = "#D55E00"
 OTHER: Final = "#009E73"
 FOURTH: Final = "#CC79A7"
 NOISY: Final = "0.65"
-CYCLE: Final = (TRUTH, OURS, OTHER, FOURTH, "#E69F00", "#56B4E9", "#000000", "#F0E442")
 LIGHT: Final = "inferno"
 """Of brightness."""
 DEPTH: Final = "viridis"
