@@ -83,3 +83,18 @@ def test_noise_has_to_fit_the_returns() -> None:
 
     with pytest.raises(tm.ShapeError, match="noise"):
         tm.merge_returns(returns, tm.noise.MomentNoise(np.ones((3, 5))))
+
+
+def test_without_noise_a_hundredth_of_the_light_is_assumed() -> None:
+    rng = np.random.default_rng(4)
+    apart = rng.uniform(0.01, 0.6, 400)
+    phase = np.stack([np.full(400, 2.0), 2.0 + apart, np.full(400, 4.5)])
+    b = moments_of_returns(phase, np.array([[3.0], [2.0], [1.0]]) * np.ones((3, 400)), 3)
+    returns = tm.pisarenko(b)
+    light = returns.weight.sum(axis=0) + np.maximum(returns.uniform, 0)
+    noise = tm.noise.MomentNoise(np.broadcast_to((0.01 * light) ** 2, b.shape))
+
+    assumed, stated = tm.merge_returns(returns), tm.merge_returns(returns, noise)
+
+    np.testing.assert_array_equal(assumed.count, stated.count)
+    assert 0.1 < (assumed.count == 2).mean() < 0.9
