@@ -207,7 +207,7 @@ class HotPixels(_SomePixels):
     name = "hot-pixels"
     what = "some pixels fill up without light"
     figures = "hot_pixels"
-    reason = "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons a second"
+    reason = "{0[0]:.2%} of the pixels have {0[1]:,.0f} electrons a second"
     cost_s_per_pixel = 2e-10
 
     def __init__(self, conditions: Conditions) -> None:
@@ -230,7 +230,7 @@ class NoisyPixels(_SomePixels):
     name = "noisy-pixels"
     what = "some pixels are read with more noise"
     figures = "noisy_pixels"
-    reason = "{0[0]:.2%} of the pixels have {0[1]:.3g} electrons of further noise"
+    reason = "{0[0]:.2%} of the pixels have {0[1]:,.0f} electrons of further noise"
     cost_s_per_pixel = 1.5e-9
     adds_variance = True
 

@@ -108,7 +108,7 @@ def test_explanations_name_the_faults_of_a_device() -> None:
 
     assert explained.device == "ideal (but for crosstalk, hot pixels)"
     assert reasons["crosstalk"] == "5.00% of a pixel's light goes to its four neighbours"
-    assert reasons["hot-pixels"] == "1.00% of the pixels have 1e+06 electrons a second"
+    assert reasons["hot-pixels"] == "1.00% of the pixels have 1,000,000 electrons a second"
 
 
 # --- light that goes elsewhere --------------------------------------------------------------------
